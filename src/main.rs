@@ -1,0 +1,3 @@
+//! The `penumbra` command.
+
+fn main() {}

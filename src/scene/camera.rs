@@ -1,0 +1,37 @@
+//! Cameras.
+
+use bevy_ecs::prelude::*;
+
+/// Looks along local −Z, +Y up.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[require(super::Transform)]
+pub struct Camera {
+    /// How directions meet pixels.
+    pub projection: Projection,
+}
+
+/// How directions meet pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Through one point.
+    Perspective {
+        /// Vertical field of view, radians, in (0, π).
+        vertical_fov: f32,
+    },
+    /// In parallel.
+    Orthographic {
+        /// Height of the picture in scene units, above 0.
+        height: f32,
+    },
+}
+
+impl Default for Camera {
+    /// 45 degrees.
+    fn default() -> Self {
+        Self { projection: Projection::Perspective { vertical_fov: std::f32::consts::FRAC_PI_4 } }
+    }
+}
+
+/// The entity whose [`Camera`] makes the picture.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ActiveCamera(pub Entity);

@@ -1,0 +1,73 @@
+//! Triangle meshes and their instances.
+
+use bevy_ecs::prelude::*;
+use glam::{Vec2, Vec3, Vec4};
+use std::sync::Arc;
+
+/// A mesh asset: its own entity, shared by any number of [`Instance`]s.
+///
+/// Replace the `Arc` (or `Arc::make_mut` it) to edit; `Changed<Mesh>` rebuilds just its own BLAS.
+#[derive(Component, Clone, Debug)]
+pub struct Mesh(pub Arc<TriangleMesh>);
+
+/// Indexed triangles in local space. Counter-clockwise is the front.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertex positions; every one that a triangle uses is finite.
+    pub positions: Vec<Vec3>,
+    /// Unit vertex normals: one a vertex, or empty for flat shading.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, origin at the top left (glTF): one a vertex, or empty.
+    pub uvs: Vec<Vec2>,
+    /// Linear RGBA factors on the base colour: one a vertex, or empty.
+    pub colors: Vec<Vec4>,
+    /// Vertex indices, each below `positions.len()`.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each triangle the index into [`Instance::materials`]; empty means all 0.
+    pub slots: Vec<u16>,
+}
+
+impl TriangleMesh {
+    /// Which of the instance's materials `triangle` wears.
+    #[must_use]
+    pub fn slot(&self, triangle: usize) -> usize {
+        self.slots.get(triangle).map_or(0, |&slot| usize::from(slot))
+    }
+
+    /// The three corners of `triangle` in local space.
+    #[must_use]
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.triangles[triangle].map(|i| self.positions[i as usize])
+    }
+
+    /// Drops triangles with no area or with a corner that is not finite; returns how many.
+    ///
+    /// The area is judged in double precision after scaling, so that tiny triangles stay.
+    pub fn drop_degenerate(&mut self) -> usize {
+        let keep: Vec<bool> = (0..self.triangles.len())
+            .map(|i| {
+                let [a, b, c] = self.corners(i).map(|p| p.as_dvec3());
+                let normal = (b - a).cross(c - a);
+                normal.is_finite() && normal.length_squared() > 0.0
+            })
+            .collect();
+        let dropped = keep.iter().filter(|&&k| !k).count();
+        if dropped > 0 {
+            let mut kept = keep.iter();
+            self.triangles.retain(|_| kept.next().copied().unwrap_or(true));
+            let mut kept = keep.iter();
+            self.slots.retain(|_| kept.next().copied().unwrap_or(true));
+        }
+        dropped
+    }
+}
+
+/// One placed use of a mesh. Both references are to entities, so an edit shows up as a change there.
+#[derive(Component, Clone, Debug, PartialEq)]
+#[require(super::Transform)]
+pub struct Instance {
+    /// Entity with a [`Mesh`]. If it is gone, so is the instance from the picture.
+    pub mesh: Entity,
+    /// Entities with a [`super::Material`], by slot. A missing one shows as the default material.
+    pub materials: Vec<Entity>,
+}

@@ -1,0 +1,18 @@
+//! What is there: the components of the scene's entities. No rays, no files.
+//!
+//! Everything is linear: lengths in scene units (glTF: metres), angles in radians, colours and
+//! radiances as linear RGB with Rec. 709 primaries. The world is right-handed, +Y up.
+
+pub mod camera;
+pub mod light;
+pub mod material;
+pub mod mesh;
+pub mod texture;
+pub mod transform;
+
+pub use camera::{ActiveCamera, Camera, Projection};
+pub use light::{Emission, Light, Visible};
+pub use material::{Alpha, Glass, Glossy, Material, TextureUse};
+pub use mesh::{Instance, Mesh, TriangleMesh};
+pub use texture::{Encoding, Filter, Texels, Texture, Wrap};
+pub use transform::{GlobalTransform, Transform, propagate_transforms};
