@@ -1,7 +1,10 @@
 //! Penumbra: a progressive CPU ray tracer that says how wrong its picture still is.
 //!
 //! Data flows one way: files → [`load`] → entities ([`scene`]) → `sync` → flat arrays → `bvh` and
-//! `trace` → film → `image` → file or screen.
+//! [`trace`] → film → [`image`](mod@image) → file or screen. [`app`] holds the one list of systems.
 
+pub mod app;
+pub mod image;
 pub mod load;
 pub mod scene;
+pub mod trace;

@@ -1,0 +1,192 @@
+//! The accumulated picture: exact sums in two independent halves.
+//!
+//! Sums are integers, so that addition is associative: the film is the same bit for bit for any
+//! thread count, tile order and splitting of the sample range, and never stops growing
+//! (an f32 sum of ones stops at 2²⁴). Even samples go to one half, odd samples to the other;
+//! the halves are scrambled independently, so their difference measures the error of their mean.
+
+use bevy_ecs::prelude::*;
+use glam::{DVec3, UVec2, Vec3};
+
+/// Side of a tile in pixels.
+pub const TILE: u32 = 16;
+
+/// A sum of f32 samples as a multiple of 2⁻⁶⁰.
+///
+/// Exact for samples that are multiples of it (any f32 above 2⁻³⁶ in magnitude), else rounded to
+/// the nearest. Samples must lie below 2³⁵ in magnitude; then 2³² of them fit with room to spare.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Sum(i128);
+
+impl Sum {
+    const FRACTION_BITS: i32 = 60;
+    const LIMIT: f32 = (1u64 << 35) as f32;
+
+    fn add(&mut self, sample: f32) {
+        let bits = sample.to_bits();
+        let exponent = (bits >> 23 & 0xff) as i32;
+        let mantissa = i128::from(bits & 0x7f_ffff) | i128::from(exponent != 0) << 23;
+        // The sample is mantissa · 2^(max(exponent, 1) − 150).
+        let shift = exponent.max(1) - 150 + Self::FRACTION_BITS;
+        let magnitude = match shift {
+            0.. => mantissa << shift,
+            -25..0 => (mantissa + (1 << (-shift - 1))) >> -shift,
+            _ => 0,
+        };
+        self.0 += if sample.is_sign_negative() { -magnitude } else { magnitude };
+    }
+
+    fn value(self) -> f64 {
+        self.0 as f64 / (1u64 << Self::FRACTION_BITS) as f64
+    }
+}
+
+/// Sums of one pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pixel {
+    sums: [[Sum; 3]; 2],
+    counts: [u32; 2],
+}
+
+impl Pixel {
+    /// Adds the linear RGB `radiance` of sample number `index`. False if it was dropped since it is
+    /// not finite, or below −2³⁵ or above 2³⁵, where no sum of light should be.
+    pub fn add(&mut self, index: u32, radiance: Vec3) -> bool {
+        // Not `any(> limit)`: a NaN must fail too.
+        if !radiance.to_array().iter().all(|c| c.abs() < Sum::LIMIT) {
+            return false;
+        }
+        let half = index as usize & 1;
+        for (sum, sample) in self.sums[half].iter_mut().zip(radiance.to_array()) {
+            sum.add(sample);
+        }
+        self.counts[half] += 1;
+        true
+    }
+
+    /// Mean radiance of all samples; black without any.
+    #[must_use]
+    pub fn mean(&self) -> DVec3 {
+        let [a, b] = &self.sums;
+        let count = f64::from(self.counts[0]) + f64::from(self.counts[1]);
+        DVec3::from_array([0, 1, 2].map(|c| Sum(a[c].0 + b[c].0).value())) / count.max(1.0)
+    }
+
+    /// Mean of one half, 0 (even samples) or 1 (odd samples); `None` without samples.
+    #[must_use]
+    pub fn half_mean(&self, half: usize) -> Option<DVec3> {
+        let count = self.counts[half];
+        (count > 0).then(|| DVec3::from_array(self.sums[half].map(Sum::value)) / f64::from(count))
+    }
+
+    /// How many samples were added.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        u64::from(self.counts[0]) + u64::from(self.counts[1])
+    }
+}
+
+/// A square of the film that one thread works on at a time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// Its top left pixel.
+    pub origin: UVec2,
+    /// Its size: [`TILE`] except at the right and lower border.
+    pub size: UVec2,
+    /// Index of the sample that comes next in each of its pixels.
+    pub next_sample: u32,
+    /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
+    pub dropped: u64,
+    pixels: Vec<Pixel>,
+}
+
+impl Tile {
+    /// Rows from the top.
+    pub fn pixels_mut(&mut self) -> &mut [Pixel] {
+        &mut self.pixels
+    }
+}
+
+/// The accumulated picture.
+#[derive(Resource, Clone, Debug, PartialEq, Eq)]
+pub struct Film {
+    size: UVec2,
+    first_sample: u32,
+    tiles: Vec<Tile>,
+}
+
+impl Film {
+    /// An empty film of `size` pixels whose first sample has index `first_sample`.
+    #[must_use]
+    pub fn new(size: UVec2, first_sample: u32) -> Self {
+        let size = size.max(UVec2::ONE);
+        let across = UVec2::new(size.x.div_ceil(TILE), size.y.div_ceil(TILE));
+        let tiles = (0..across.y)
+            .flat_map(|y| (0..across.x).map(move |x| UVec2::new(x, y) * TILE))
+            .map(|origin| {
+                let size = (size - origin).min(UVec2::splat(TILE));
+                let pixels = vec![Pixel::default(); size.element_product() as usize];
+                Tile { origin, size, next_sample: first_sample, dropped: 0, pixels }
+            })
+            .collect();
+        Self { size, first_sample, tiles }
+    }
+
+    /// Forgets all samples.
+    pub fn reset(&mut self) {
+        let first_sample = self.first_sample;
+        for tile in &mut self.tiles {
+            tile.next_sample = first_sample;
+            tile.dropped = 0;
+            tile.pixels.fill(Pixel::default());
+        }
+    }
+
+    /// Width and height in pixels.
+    #[must_use]
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// All tiles, in rows from the top.
+    #[must_use]
+    pub fn tiles(&self) -> &[Tile] {
+        &self.tiles
+    }
+
+    /// All tiles, to work on.
+    pub fn tiles_mut(&mut self) -> &mut [Tile] {
+        &mut self.tiles
+    }
+
+    /// The pixel at `x`, `y` from the top left.
+    #[must_use]
+    pub fn pixel(&self, x: u32, y: u32) -> &Pixel {
+        let across = self.size.x.div_ceil(TILE);
+        let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
+        &tile.pixels[(y % TILE * tile.size.x + x % TILE) as usize]
+    }
+
+    /// Samples that every pixel has.
+    #[must_use]
+    pub fn complete_samples(&self) -> u32 {
+        self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample
+    }
+
+    /// Samples a pixel has on average.
+    #[must_use]
+    pub fn mean_samples(&self) -> f64 {
+        let sum: f64 = self
+            .tiles
+            .iter()
+            .map(|t| f64::from(t.next_sample - self.first_sample) * f64::from(t.size.element_product()))
+            .sum();
+        sum / f64::from(self.size.element_product())
+    }
+
+    /// Samples dropped because they were not finite.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.tiles.iter().map(|t| t.dropped).sum()
+    }
+}
