@@ -31,3 +31,10 @@ pub struct LoadReport {
     /// Triangles of all instances, before degenerate ones are dropped.
     pub triangles: usize,
 }
+
+/// x
+#[derive(Debug, thiserror::Error)]
+#[error("x")]
+pub struct LoadError;
+/// x
+pub fn load(_: &mut World, _: &SceneSource, _: &LoadOptions) -> Result<LoadReport, LoadError> { Err(LoadError) }

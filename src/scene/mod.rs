@@ -4,6 +4,7 @@
 //! radiances as linear RGB with Rec. 709 primaries. The world is right-handed, +Y up.
 
 pub mod camera;
+pub mod color;
 pub mod light;
 pub mod material;
 pub mod mesh;
