@@ -139,6 +139,12 @@ impl App {
     }
 }
 
+/// Brings [`crate::scene::GlobalTransform`]s up to date outside of a frame.
+pub fn propagate(world: &mut World) {
+    // The system takes its inputs from this very world and cannot fail to run.
+    let _ = world.run_system_cached(propagate_transforms);
+}
+
 /// The one list of systems.
 fn frame_schedule() -> Schedule {
     use FrameSystems::{Input, Present, Sync, Trace, Update};

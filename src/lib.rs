@@ -5,9 +5,12 @@
 
 pub mod app;
 pub mod bvh;
+pub mod cli;
 pub mod image;
 pub mod load;
+pub mod open;
 pub mod preview;
+pub mod render;
 pub mod scene;
 pub mod sync;
 pub mod trace;

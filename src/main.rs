@@ -1,3 +1,251 @@
-//! The `penumbra` command.
+//! The `penumbra` command: arguments in, exit code out. The one place that prints.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is the program's mouth")]
 
-fn main() {}
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use penumbra::cli::{Cli, Command, CompareArgs, OutputArgs, SceneArgs, WindowArgs};
+use penumbra::image::PictureFormat;
+use penumbra::image::compare::compare_files;
+use penumbra::load::{LoadReport, built_in_scenes};
+use penumbra::open::OpenError;
+use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Documented in the README and in `--help`.
+mod exit {
+    pub const FAILED: u8 = 1;
+    pub const BAD_COMMAND_LINE: u8 = 2;
+    pub const SCENE_NOT_READABLE: u8 = 3;
+    pub const BEFORE_TARGET: u8 = 4;
+    pub const ABOVE_LIMIT: u8 = 5;
+    pub const INTERRUPTED: u8 = 130;
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let code = match cli.command {
+        Some(Command::Render(args)) => headless(&args.scene, &args.output),
+        Some(Command::Compare(args)) => compare(&args),
+        None if cli.window.list_scenes => {
+            for scene in built_in_scenes() {
+                println!("{:<15} {}", scene.name, scene.description);
+            }
+            0
+        }
+        None if !cli.window.output.output.is_empty() => headless(&cli.window.scene, &cli.window.output),
+        None => window(&cli.window),
+    };
+    ExitCode::from(code)
+}
+
+#[cfg(not(feature = "view"))]
+fn window(args: &WindowArgs) -> u8 {
+    eprintln!("built without the window (feature `view`): rendering to a picture instead");
+    instead_of_window(args)
+}
+
+#[cfg(feature = "view")]
+fn window(args: &WindowArgs) -> u8 {
+    instead_of_window(args)
+}
+
+/// Renders what the window would have shown to `SCENE.png` in the current folder.
+fn instead_of_window(args: &WindowArgs) -> u8 {
+    let name = args.scene.source().map_or_else(|_| "scene".to_owned(), |source| source.name());
+    headless_to(&args.scene, &args.output, vec![PathBuf::from(format!("{name}.png"))])
+}
+
+fn headless(scene: &SceneArgs, output: &OutputArgs) -> u8 {
+    let mut outputs = Vec::new();
+    for path in &output.output {
+        // NAME alone means both.
+        if path.extension().is_none() {
+            outputs.extend([path.with_extension("png"), path.with_extension("exr")]);
+        } else if let Err(error) = PictureFormat::of(path) {
+            eprintln!("error: {error}");
+            return exit::BAD_COMMAND_LINE;
+        } else {
+            outputs.push(path.clone());
+        }
+    }
+    headless_to(scene, output, outputs)
+}
+
+fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) -> u8 {
+    let source = match scene.source() {
+        Ok(source) => source,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::SCENE_NOT_READABLE;
+        }
+    };
+    if outputs.is_empty() && !output.json {
+        eprintln!("note: no -o FILE: nothing will be written");
+    }
+    set_threads(scene.threads);
+    let interrupt = Arc::new(AtomicBool::new(false));
+    stop_on_signals(&interrupt);
+    let job = RenderJob {
+        source,
+        load: scene.load_options(),
+        wishes: scene.wishes(output),
+        time_limit: output.time_limit,
+        outputs,
+        interrupt,
+    };
+    let bar = Bar::new(output.quiet);
+    let result = render(&job, |opened| tell(&opened.report), |progress| bar.update(progress));
+    bar.clear();
+    match result {
+        Ok(summary) => finish(&summary, output),
+        Err(RenderError::Open(OpenError::Load(error))) => {
+            eprintln!("error: {error}");
+            exit::SCENE_NOT_READABLE
+        }
+        Err(RenderError::Open(error)) => {
+            eprintln!("error: {error}");
+            exit::BAD_COMMAND_LINE
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            exit::FAILED
+        }
+    }
+}
+
+fn finish(summary: &RenderSummary, output: &OutputArgs) -> u8 {
+    if !output.quiet {
+        let noise = summary.noise.map_or("unknown".to_owned(), |n| format!("{:.2} %", n * 100.0));
+        eprintln!(
+            "{}: {:.0} samples per pixel in {:.2} s (load {:.2} s, build {:.3} s), {:.2} Mrays/s, estimated noise {noise}",
+            summary.scene,
+            summary.samples,
+            summary.render_seconds,
+            summary.load_seconds,
+            summary.build_seconds,
+            summary.rays_per_second * 1e-6,
+        );
+        for path in &summary.outputs {
+            eprintln!("wrote {path}");
+        }
+    }
+    if summary.dropped_samples > 0 {
+        eprintln!("warning: {} samples were not finite and were left out", summary.dropped_samples);
+    }
+    if output.json {
+        match serde_json::to_string(summary) {
+            Ok(json) => println!("{json}"),
+            Err(error) => {
+                eprintln!("error: {error}");
+                return exit::FAILED;
+            }
+        }
+    }
+    if summary.interrupted {
+        exit::INTERRUPTED
+    } else if summary.out_of_time {
+        exit::BEFORE_TARGET
+    } else {
+        0
+    }
+}
+
+fn tell(report: &LoadReport) {
+    for line in &report.warnings {
+        eprintln!("warning: {line}");
+    }
+    for line in &report.decisions {
+        eprintln!("note: {line}");
+    }
+}
+
+fn set_threads(threads: usize) {
+    // Fails only if the pool is already there, which is no harm.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+}
+
+/// The first signal asks for an end with a picture, the second ends at once.
+fn stop_on_signals(interrupt: &Arc<AtomicBool>) {
+    let interrupt = Arc::clone(interrupt);
+    let set = ctrlc::set_handler(move || {
+        if interrupt.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(exit::INTERRUPTED));
+        }
+    });
+    if let Err(error) = set {
+        eprintln!("warning: Ctrl-C will not save the picture: {error}");
+    }
+}
+
+/// One line, redrawn on a terminal; elsewhere a line every few seconds.
+struct Bar {
+    bar: Option<ProgressBar>,
+    last_line: std::cell::Cell<Option<Instant>>,
+    quiet: bool,
+}
+
+impl Bar {
+    fn new(quiet: bool) -> Self {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let style = ProgressStyle::with_template("{bar:32} {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+            ProgressBar::new(1000).with_style(style)
+        });
+        Self { bar, last_line: std::cell::Cell::new(Some(Instant::now())), quiet }
+    }
+
+    fn update(&self, progress: &Progress) {
+        let by_samples = progress.samples / f64::from(progress.target);
+        let part = progress.limit.map_or(by_samples, |limit| by_samples.max(progress.seconds / limit)).clamp(0.0, 1.0);
+        let left = if part > 0.01 { format!("{:.0} s left", progress.seconds / part * (1.0 - part)) } else { "…".into() };
+        let noise = progress.noise.map_or("—".to_owned(), |n| format!("{:.2} %", n * 100.0));
+        let message = format!("{:.0} samples per pixel, noise {noise}, {:.0} s, {left}", progress.samples, progress.seconds);
+        if let Some(bar) = &self.bar {
+            bar.set_position((part * 1000.0) as u64);
+            bar.set_message(message);
+        } else if !self.quiet && self.last_line.get().is_none_or(|last| last.elapsed() > Duration::from_secs(5)) {
+            eprintln!("{:3.0} %: {message}", part * 100.0);
+            self.last_line.set(Some(Instant::now()));
+        }
+    }
+
+    fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn compare(args: &CompareArgs) -> u8 {
+    let difference = match compare_files(&args.a, &args.b) {
+        Ok(difference) => difference,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::FAILED;
+        }
+    };
+    if args.json {
+        match serde_json::to_string(&difference) {
+            Ok(json) => println!("{json}"),
+            Err(error) => {
+                eprintln!("error: {error}");
+                return exit::FAILED;
+            }
+        }
+    } else {
+        let [x, y] = difference.max_at;
+        println!("RMSE      {:.6e}", difference.rmse);
+        println!("relMSE    {:.6e}", difference.relative_mse);
+        println!("max error {:.6e} at pixel {x},{y}", difference.max_error);
+        println!("mean      {:+.6e}", difference.bias);
+        if difference.not_finite > 0 {
+            println!("{} values are not finite and were left out", difference.not_finite);
+        }
+    }
+    let failed = |limit: f64| difference.not_finite > 0 || !(difference.rmse <= limit);
+    if args.fail_above.is_some_and(failed) { exit::ABOVE_LIMIT } else { 0 }
+}

@@ -15,6 +15,7 @@ use glam::{DVec3, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
     origin: Vec3,
+    direction: Vec3,
     /// Axis of the largest direction component last, the others in the order that keeps winding.
     axes: [usize; 3],
     shear: Vec3,
@@ -37,6 +38,8 @@ pub struct TriangleHit {
 
 /// 5 units from the triangle test, 3 from the box test's own operations, rounded up.
 const SLACK: f32 = 12.0 / (1 << 24) as f32;
+/// A hit nearer than this part of the farthest corner's distance is measured again in double precision.
+const CANCELLATION: f32 = 0.25;
 
 /// The next float in the direction of `side` in each axis: far from the world's origin a sum with
 /// something small may round to nothing.
@@ -69,6 +72,7 @@ impl Probe {
         let inverse = direction.map(|d| (1.0 / d).clamp(-f32::MAX, f32::MAX));
         Self {
             origin: ray.origin,
+            direction,
             axes: [x, y, z],
             shear,
             inverse,
@@ -128,9 +132,24 @@ impl Probe {
         if !determinant.is_finite() {
             return self.huge_triangle(corners, t_max);
         }
-        let scaled = u * (self.shear.z * a[z]) + v * (self.shear.z * b[z]) + w * (self.shear.z * c[z]);
+        let (az, bz, cz) = (self.shear.z * a[z], self.shear.z * b[z], self.shear.z * c[z]);
+        let mut t = (u * az + v * bz + w * cz) / determinant;
+        if t <= az.abs().max(bz.abs()).max(cz.abs()) * CANCELLATION {
+            t = self.plane_distance(corners).unwrap_or(t);
+        }
         let inverse = 1.0 / determinant;
-        self.clamped(corners, scaled / determinant, v * inverse, w * inverse, t_max)
+        self.clamped(corners, t, v * inverse, w * inverse, t_max)
+    }
+
+    /// t of the triangle's plane in double precision; `None` for a ray in the plane.
+    ///
+    /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to
+    /// the origin of the ray that is not enough: a ray that starts on a large triangle would hit it.
+    fn plane_distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        let t = normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3());
+        t.is_finite().then_some(t as f32)
     }
 
     /// The same in double precision, for coordinates whose products overflow.

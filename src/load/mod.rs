@@ -201,10 +201,3 @@ fn load_model(model: Model, materials: &mut Materials, sink: &mut Sink<'_>) -> R
     materials.all = None;
     Ok(())
 }
-
-/// x
-#[derive(Debug, thiserror::Error)]
-#[error("x")]
-pub struct LoadError;
-/// x
-pub fn load(_: &mut World, _: &SceneSource, _: &LoadOptions) -> Result<LoadReport, LoadError> { Err(LoadError) }

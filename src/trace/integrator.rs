@@ -163,7 +163,7 @@ impl Batch {
                 None => self.radiance[path.entry as usize] += path.throughput * emission,
             }
         }
-        if !path.last {
+        if !path.last && path.depth < scene.settings.max_depth {
             self.scatter(scene, path, surface, &at);
         }
     }
@@ -198,16 +198,13 @@ impl Batch {
                 }
             }
         }
-        let exhausted = path.depth >= scene.settings.max_depth;
-        // The last bounce may still run into a light by itself, if that is one of the two ways to sample it.
-        let lobes = if exhausted { Lobes { delta: false, ..followed } } else { followed };
-        if !bsdf.has(lobes) {
+        if !bsdf.has(followed) {
             return;
         }
         let choice = path.sampler.pair(base + LOBE);
-        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), lobes) else { return };
+        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), followed) else { return };
         let mut throughput = path.throughput * sample.weight;
-        if path.depth >= ROULETTE_DEPTH && !exhausted {
+        if path.depth >= ROULETTE_DEPTH {
             let survival = throughput.max_element().clamp(0.05, 1.0);
             if choice.y >= survival {
                 return;
@@ -222,7 +219,7 @@ impl Batch {
             throughput,
             depth: path.depth + 1,
             bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal() }),
-            last: exhausted || smooth && scene.settings.integrator == Integrator::Direct,
+            last: smooth && scene.settings.integrator == Integrator::Direct,
         });
     }
 

@@ -11,7 +11,8 @@ pub struct RenderSettings {
     pub size: UVec2,
     /// How light is gathered.
     pub integrator: Integrator,
-    /// Bounces before the last connection to a light: 0 = direct light only, no mirrors.
+    /// Most bounces on a path from the eye to a light: 0 shows what shines, 1 direct light, and so on.
+    /// (Mitsuba counts one more: its edges; Blender one less: its bounces before the last connection.)
     pub max_depth: u32,
     /// Another seed, other noise.
     pub seed: u32,

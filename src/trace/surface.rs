@@ -40,16 +40,14 @@ impl Interaction {
 
         // In double precision the point lies in the plane whatever the rounding of u and v.
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        let shares = [corners[0] * (1.0 - u - v), corners[1] * u, corners[2] * v];
-        let local = shares[0] + shares[1] + shares[2];
+        let local = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
         let world_from_local = placement.world_from_local();
         let position = world_from_local.transform_point3(local);
 
-        // The next ray rounds its origin in local space and tests with distances to the corners.
-        let local_error = (shares[0].abs() + shares[1].abs() + shares[2].abs()) * (8.0 * UNIT);
+        // The next ray starts from the rounded point, and rounds again on its way into local space.
         let m = world_from_local.matrix3;
-        let spread = m.x_axis.abs() * local_error.x + m.y_axis.abs() * local_error.y + m.z_axis.abs() * local_error.z;
-        let error = spread + position.abs() * (2.0 * UNIT);
+        let spread = m.x_axis.abs() * local.x.abs() + m.y_axis.abs() * local.y.abs() + m.z_axis.abs() * local.z.abs();
+        let error = (position.abs() + spread) * (2.0 * UNIT);
 
         // The inverse transpose keeps sides, also under a mirroring placement.
         let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]);

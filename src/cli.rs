@@ -1,0 +1,291 @@
+//! The command line: arguments in, wishes out.
+
+use crate::image::ToneMap;
+use crate::load::{LoadError, LoadOptions, SceneSource};
+use crate::open::{Pose, Wishes};
+use crate::scene::Filter;
+use crate::trace::Integrator;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use glam::{DVec3, UVec2};
+use std::ops::Range;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Fly through a glTF or OBJ scene and watch its soft shadows converge.
+#[derive(Debug, Parser)]
+#[command(version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
+#[command(after_help = "Exit codes: 0 done; 1 failed; 2 bad command line; 3 scene not readable; \
+4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved).")]
+pub struct Cli {
+    /// What to do; nothing opens the window.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// What to open in the window.
+    #[command(flatten)]
+    pub window: WindowArgs,
+}
+
+/// Everything but the window.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render to a file, without a window
+    Render(RenderArgs),
+    /// Say how much picture A differs from reference B
+    Compare(CompareArgs),
+}
+
+/// Arguments of the window.
+#[derive(Debug, Args)]
+pub struct WindowArgs {
+    /// Scene and look.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Write a picture instead of opening a window (as `render`)
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// Name the built-in scenes
+    #[arg(long)]
+    pub list_scenes: bool,
+}
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// Scene and look.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Where to.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+/// Where a headless render goes and when it ends.
+#[derive(Debug, Args)]
+pub struct OutputArgs {
+    /// File to write: .png (developed) or .exr (linear); may be given several times
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Stop tracing after this many seconds
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub time_limit: Option<Duration>,
+    /// Render just these sample indices, A up to but not including B
+    #[arg(long, value_name = "A..B", value_parser = sample_range, conflicts_with = "spp")]
+    pub sample_range: Option<Range<u32>>,
+    /// Print one JSON object about the render to standard output
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on standard error
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// The scene and how it should look.
+#[derive(Debug, Args)]
+pub struct SceneArgs {
+    /// A .gltf, .glb, .obj or .toml file, or a built-in scene (see --list-scenes)
+    #[arg(default_value = "cornell")]
+    pub scene: String,
+    /// Settings file to use instead of the .toml beside the scene
+    #[arg(long, value_name = "FILE")]
+    pub scene_settings: Option<PathBuf>,
+    /// Size of the picture
+    #[arg(long, value_name = "WxH", value_parser = resolution)]
+    pub resolution: Option<UVec2>,
+    /// Samples per pixel
+    #[arg(long, visible_alias = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Another seed, other noise
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u32>,
+    /// Threads to trace with; 0 = all
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// direct = direct light, also in mirrors and through glass; path = global illumination
+    #[arg(long, value_enum)]
+    pub integrator: Option<IntegratorArg>,
+    /// Most bounces from eye to light: 0 shows only what shines, 1 direct light, 2 one bounce more
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
+    /// Texture filter, whatever the file asks for
+    #[arg(long, value_enum)]
+    pub filter: Option<FilterArg>,
+    /// Camera of the file, by name or by number from 0
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Put the camera here
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub camera_position: Option<DVec3>,
+    /// Look at this point
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub camera_focal_point: Option<DVec3>,
+    /// What is up in the picture
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub camera_view_up: Option<DVec3>,
+    /// Vertical field of view in degrees
+    #[arg(long, value_name = "DEG", value_parser = view_angle)]
+    pub camera_view_angle: Option<f32>,
+    /// Exposure in stops
+    #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true)]
+    pub exposure: Option<f32>,
+    /// What happens above white
+    #[arg(long, value_enum)]
+    pub tone_map: Option<ToneMapArg>,
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// The picture: PNG, EXR or another common format
+    pub a: PathBuf,
+    /// The reference, of the same size
+    pub b: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// End with exit code 5 if the RMSE is above this
+    #[arg(long, value_name = "X")]
+    pub fail_above: Option<f64>,
+}
+
+/// See [`Integrator`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum IntegratorArg {
+    /// Direct light, also in mirrors and through glass.
+    Direct,
+    /// Global illumination.
+    Path,
+}
+
+/// See [`Filter`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum FilterArg {
+    /// The texel under the point.
+    Nearest,
+    /// Linear between four texels.
+    Bilinear,
+}
+
+/// See [`ToneMap`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ToneMapArg {
+    /// Cut off.
+    Clip,
+    /// Khronos PBR Neutral.
+    Neutral,
+}
+
+impl SceneArgs {
+    /// Which scene.
+    ///
+    /// # Errors
+    /// If it is neither a file nor built in.
+    pub fn source(&self) -> Result<SceneSource, LoadError> {
+        SceneSource::parse(&self.scene)
+    }
+
+    /// How to load it.
+    #[must_use]
+    pub fn load_options(&self) -> LoadOptions {
+        LoadOptions { scene_settings: self.scene_settings.clone() }
+    }
+
+    /// How it should look.
+    #[must_use]
+    pub fn wishes(&self, output: &OutputArgs) -> Wishes {
+        let range = output.sample_range.clone();
+        Wishes {
+            size: self.resolution,
+            samples: range.as_ref().map(|r| r.end - r.start).or(self.spp),
+            first_sample: range.map_or(0, |r| r.start),
+            integrator: self.integrator.map(|i| match i {
+                IntegratorArg::Direct => Integrator::Direct,
+                IntegratorArg::Path => Integrator::Path,
+            }),
+            max_depth: self.max_depth,
+            seed: self.seed,
+            filter: self.filter.map(|f| match f {
+                FilterArg::Nearest => Filter::Nearest,
+                FilterArg::Bilinear => Filter::Bilinear,
+            }),
+            exposure: self.exposure,
+            tone_map: self.tone_map.map(|t| match t {
+                ToneMapArg::Clip => ToneMap::Clip,
+                ToneMapArg::Neutral => ToneMap::Neutral,
+            }),
+            camera: self.camera.clone(),
+            pose: Pose {
+                position: self.camera_position,
+                focal_point: self.camera_focal_point,
+                view_up: self.camera_view_up,
+                view_angle: self.camera_view_angle,
+            },
+        }
+    }
+}
+
+fn resolution(text: &str) -> Result<UVec2, String> {
+    let wrong = || format!("\"{text}\" is not a size such as 1280x720");
+    let (width, height) = text.split_once(['x', ',']).ok_or_else(wrong)?;
+    let side = |s: &str| s.trim().parse().ok().filter(|n| (1..=65536).contains(n)).ok_or_else(wrong);
+    let size = UVec2::new(side(width)?, side(height)?);
+    // 112 bytes a pixel: more than this is a slip of the finger.
+    if u64::from(size.x) * u64::from(size.y) > 1 << 28 {
+        return Err(format!("\"{text}\" has more than 2^28 pixels"));
+    }
+    Ok(size)
+}
+
+fn vector(text: &str) -> Result<DVec3, String> {
+    let wrong = || format!("\"{text}\" is not a vector such as 1,2.5,-3");
+    let numbers: Vec<f64> = text.split(',').map(|s| s.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    let [x, y, z] = *numbers.as_slice() else { return Err(wrong()) };
+    let vector = DVec3::new(x, y, z);
+    if vector.is_finite() { Ok(vector) } else { Err(wrong()) }
+}
+
+fn view_angle(text: &str) -> Result<f32, String> {
+    let degrees = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if 0.0 < degrees && degrees < 180.0 { Ok(degrees) } else { Err("must lie between 0 and 180 degrees".to_owned()) }
+}
+
+fn exposure(text: &str) -> Result<f32, String> {
+    let stops: f32 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if stops.abs() <= 100.0 { Ok(stops) } else { Err("must lie within -100 to 100 stops".to_owned()) }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let number: f64 = text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    Duration::try_from_secs_f64(number).map_err(|e| e.to_string())
+}
+
+fn sample_range(text: &str) -> Result<Range<u32>, String> {
+    let wrong = || format!("\"{text}\" is not a range such as 16..64");
+    let (start, end) = text.split_once("..").ok_or_else(wrong)?;
+    let range = start.trim().parse().map_err(|_| wrong())?..end.trim().parse().map_err(|_| wrong())?;
+    if range.is_empty() { Err(format!("\"{text}\" holds no sample")) } else { Ok(range) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_read_as_people_write_them() {
+        assert_eq!(resolution("1280x720"), Ok(UVec2::new(1280, 720)));
+        assert_eq!(resolution("7,3"), Ok(UVec2::new(7, 3)));
+        assert_eq!(vector("-1, 2.5,3e1"), Ok(DVec3::new(-1.0, 2.5, 30.0)));
+        assert_eq!(sample_range("16..64"), Ok(16..64));
+        assert_eq!(seconds("1.5s"), Ok(Duration::from_millis(1500)));
+        for wrong in ["0x5", "5", "ax3", "65536x65536"] {
+            assert!(resolution(wrong).is_err(), "{wrong}");
+        }
+        assert!(vector("1,2").is_err() && vector("1,2,nan").is_err());
+        assert!(sample_range("64..16").is_err() && view_angle("180").is_err() && exposure("nan").is_err());
+    }
+}

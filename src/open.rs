@@ -1,0 +1,152 @@
+//! Arguments and a file → a world ready to make frames. The window and `render` both start here.
+
+use crate::app::{App, FrameBudget};
+use crate::image::{Display, ToneMap};
+use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Projection, Transform};
+use crate::trace::{Film, Integrator, RenderSettings};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::*;
+use glam::{DVec3, UVec2};
+use std::time::Instant;
+
+/// What the user asks for; `None` leaves it to the scene's settings file, then to the default.
+#[derive(Clone, Debug, Default)]
+pub struct Wishes {
+    /// Width and height in pixels.
+    pub size: Option<UVec2>,
+    /// Samples per pixel.
+    pub samples: Option<u32>,
+    /// Index of the first sample.
+    pub first_sample: u32,
+    /// How light is gathered.
+    pub integrator: Option<Integrator>,
+    /// See [`RenderSettings::max_depth`].
+    pub max_depth: Option<u32>,
+    /// See [`RenderSettings::seed`].
+    pub seed: Option<u32>,
+    /// Overrides the textures' own filters.
+    pub filter: Option<Filter>,
+    /// Exposure in stops.
+    pub exposure: Option<f32>,
+    /// What happens above white.
+    pub tone_map: Option<ToneMap>,
+    /// Which camera of the file, by name or by number from 0.
+    pub camera: Option<String>,
+    /// Changes to that camera.
+    pub pose: Pose,
+}
+
+/// Changes to a camera, in world space.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pose {
+    /// Where it is.
+    pub position: Option<DVec3>,
+    /// Where it looks.
+    pub focal_point: Option<DVec3>,
+    /// What is up; +Y if not said.
+    pub view_up: Option<DVec3>,
+    /// Vertical field of view in degrees.
+    pub view_angle: Option<f32>,
+}
+
+/// Why there is no world to make frames with.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The scene cannot be loaded.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// No such camera.
+    #[error("{scene}: no camera \"{wanted}\"; it has {names}")]
+    Camera {
+        /// The scene.
+        scene: String,
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        names: String,
+    },
+}
+
+/// A world ready to make frames.
+pub struct Opened {
+    /// The world; nothing is built yet.
+    pub app: App,
+    /// What loading found and did.
+    pub report: LoadReport,
+    /// Seconds that loading took.
+    pub load_seconds: f64,
+    /// Samples per pixel to make, if anybody said.
+    pub samples: Option<u32>,
+}
+
+/// Loads `source` and applies `wishes`.
+///
+/// # Errors
+/// If the scene cannot be loaded or has no such camera.
+pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Result<Opened, OpenError> {
+    let start = Instant::now();
+    let (mut app, report) = App::open(source, options, RenderSettings::default())?;
+    let file = &report.render;
+    let default = RenderSettings::default();
+    let settings = RenderSettings {
+        size: wishes.size.or(file.resolution.map(UVec2::from_array)).unwrap_or(default.size),
+        integrator: wishes.integrator.unwrap_or(match file.integrator {
+            Some(SidecarIntegrator::Path) => Integrator::Path,
+            Some(SidecarIntegrator::Direct) | None => default.integrator,
+        }),
+        max_depth: wishes.max_depth.or(file.max_depth).unwrap_or(default.max_depth),
+        seed: wishes.seed.or(file.seed.map(|seed| seed as u32)).unwrap_or(default.seed),
+        filter: wishes.filter.or(match file.filter {
+            Some(SidecarFilter::Nearest) => Some(Filter::Nearest),
+            Some(SidecarFilter::Bilinear) => Some(Filter::Bilinear),
+            _ => None,
+        }),
+    };
+    let samples = wishes.samples.or(file.spp);
+    let exposure = wishes.exposure.or(file.exposure).unwrap_or_default();
+    app.world.insert_resource(settings);
+    app.world.insert_resource(Film::new(settings.size, wishes.first_sample));
+    app.world.insert_resource(Display { exposure, tone_map: wishes.tone_map.unwrap_or_default() });
+    if let Some(samples) = samples {
+        app.world.resource_mut::<FrameBudget>().sample_target = samples;
+    }
+    choose_camera(&mut app.world, &report, &source.name(), wishes)?;
+    Ok(Opened { app, report, load_seconds: start.elapsed().as_secs_f64(), samples })
+}
+
+fn choose_camera(world: &mut World, report: &LoadReport, scene: &str, wishes: &Wishes) -> Result<(), OpenError> {
+    if let Some(wanted) = &wishes.camera {
+        let by_name = report.cameras.iter().find(|(name, _)| name == wanted);
+        let by_number = || report.cameras.get(wanted.parse::<usize>().ok()?);
+        let Some((_, camera)) = by_name.or_else(by_number) else {
+            let names: Vec<String> =
+                report.cameras.iter().enumerate().map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
+            let names = if names.is_empty() { "none of its own".to_owned() } else { names.join(", ") };
+            return Err(OpenError::Camera { scene: scene.to_owned(), wanted: wanted.clone(), names });
+        };
+        world.insert_resource(ActiveCamera(*camera));
+    }
+    let pose = &wishes.pose;
+    if pose.position.is_none() && pose.focal_point.is_none() && pose.view_up.is_none() && pose.view_angle.is_none() {
+        return Ok(());
+    }
+    // The file's camera stays what it is; this is one more, standing where it stands.
+    crate::app::propagate(world);
+    let from = world.get_resource::<ActiveCamera>().map(|active| active.0);
+    let global = from.and_then(|e| world.get::<GlobalTransform>(e)).copied().unwrap_or_default();
+    let mut camera = from.and_then(|e| world.get::<Camera>(e)).copied().unwrap_or_default();
+    if let Some(degrees) = pose.view_angle {
+        camera.projection = Projection::Perspective { vertical_fov: degrees.to_radians() };
+    }
+    let mut transform = Transform(global.0);
+    if pose.position.is_some() || pose.focal_point.is_some() || pose.view_up.is_some() {
+        let eye = pose.position.unwrap_or(global.0.translation);
+        let ahead = global.0.transform_vector3(DVec3::NEG_Z);
+        let up = pose.view_up.unwrap_or(DVec3::Y);
+        transform = Transform::looking_at(eye, pose.focal_point.unwrap_or(eye + ahead), up);
+    }
+    let entity = world.spawn((camera, transform, Name::new("command line"))).id();
+    world.insert_resource(ActiveCamera(entity));
+    Ok(())
+}
