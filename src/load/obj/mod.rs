@@ -312,7 +312,10 @@ fn number(word: &str) -> Option<f32> {
     if old {
         return Some(f32::NAN);
     }
-    let value = word.parse::<f64>().ok()?;
+    let lower = || word.trim_start_matches(['+', '-']).to_ascii_lowercase();
+    let Ok(value) = word.parse::<f64>() else {
+        return (lower().starts_with("nan") || lower().starts_with("inf")).then_some(f32::NAN);
+    };
     let is_spelled = !value.is_finite() && !word.contains(|c: char| c.is_ascii_digit());
     Some(if is_spelled { f32::NAN } else { value as f32 })
 }
