@@ -41,9 +41,9 @@ pub(super) fn asset(name: &str) -> Option<&'static [u8]> {
         };
     }
     assets!(
-        "bust.mtl", "bust.obj", "bust.toml", "checker.obj", "checker.png", "checker.toml", "cornell.gltf", "cornell.mtl",
-        "cornell.obj", "cornell.toml", "cornell-point.toml", "gallery.mtl", "gallery.obj", "gallery.toml", "mirrors.mtl",
-        "mirrors.obj", "mirrors.toml",
+        "bust.mtl", "bust.obj", "bust.toml", "checker.png", "checker.toml", "cornell.gltf", "cornell.mtl",
+        "cornell.obj", "cornell.toml", "cornell-point.toml", "gallery.mtl", "gallery.obj", "gallery.toml", "mirrors.toml",
+        "plane.obj", "sphere.obj",
     )
 }
 

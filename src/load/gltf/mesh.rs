@@ -119,8 +119,7 @@ fn read_primitive(
         Ok(Some(elements))
     };
     let Some(positions) = attribute(Semantic::Positions, &[3])? else {
-        sink.warn(format!("{file}: {place}: no POSITION, skipped"));
-        return Ok(None);
+        return Err(document.broken(place, "no POSITION: nothing says where its vertices are"));
     };
     let normals = attribute(Semantic::Normals, &[3])?;
     let mut uvs = attribute(Semantic::TexCoords(uv_set), &[2])?;

@@ -61,6 +61,7 @@ pub(super) fn load(
     let placements: Placements = parse(file, json)?;
     let buffers = buffer::read_all(&tree, folder, container.binary);
     let document = Document { file, folder, root: tree, placements: placements.nodes, buffers };
+    document.check_references()?;
     let materials = material::spawn_all(&document, overrides, sink)?;
     node::spawn_scene(&document, root, materials, sink)
 }
@@ -77,6 +78,21 @@ struct Document<'a> {
 impl Document<'_> {
     fn broken(&self, place: impl std::fmt::Display, problem: impl std::fmt::Display) -> LoadError {
         LoadError::broken(self.file, place, problem)
+    }
+
+    /// Whether accessors and buffer views name what exists, used or not: a file where they do not is
+    /// damaged.
+    fn check_references(&self) -> Result<(), LoadError> {
+        let root = &self.root;
+        for (i, accessor) in root.accessors.iter().enumerate() {
+            if let Some(view) = &accessor.buffer_view {
+                self.at(&root.buffer_views, view, "buffer view", &format!("accessor {i}"))?;
+            }
+        }
+        for (i, view) in root.buffer_views.iter().enumerate() {
+            self.at(&root.buffers, &view.buffer, "buffer", &format!("buffer view {i}"))?;
+        }
+        Ok(())
     }
 
     /// The object that `index` names, or an error that says who names it.
@@ -141,6 +157,9 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
         return Err(LoadError::broken(file, "asset", "not a glTF file: no `asset` with a version"));
     };
     let asked = version(asset.min_version.clone().or(asset.version));
+    if asked.is_empty() {
+        return Err(LoadError::broken(file, "asset", "the version is empty; Penumbra reads glTF 2.0"));
+    }
     if !asked.starts_with("2.") || (asset.min_version.is_some() && asked != "2.0") {
         let problem = format!("glTF version {asked}; Penumbra reads 2.0: export it again as glTF 2.0");
         return Err(LoadError::broken(file, "asset", problem));

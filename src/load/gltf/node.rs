@@ -37,6 +37,14 @@ pub(super) fn spawn_scene(
     }
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
+    if nodes.is_empty() && !document.root.meshes.is_empty() {
+        sink.decide(format!("{}: no node in it; shows each mesh once", document.file));
+        for i in 0..document.root.meshes.len() {
+            let built = meshes.get(document, &Index::new(i as u32), None, &mut palette, "file", sink)?;
+            let entity = sink.spawn((Name::new(format!("mesh {i}")), Transform::default(), ChildOf(root)));
+            instantiate(&built, entity, sink);
+        }
+    }
     for &i in &order {
         let node = &nodes[i];
         let user = format!("node {i}");

@@ -8,7 +8,8 @@
 //! Rules where the format leaves a choice: the whole file is one [`Mesh`] and one [`Instance`];
 //! `usemtl` may change with every face; polygons are cut into `n - 2` triangles in their own plane;
 //! without normals a face is flat unless a smoothing group (`s`) says otherwise; texture
-//! coordinates are turned from bottom-left to top-left; `g`, `o`, points, lines and free-form
+//! coordinates are turned from bottom-left to top-left; a face with a vertex spelled `nan` or `inf`
+//! is refused with its line, one with a number too large is dropped with a warning; `g`, `o`, points, lines and free-form
 //! statements are skipped.
 
 mod assemble;
@@ -46,7 +47,7 @@ pub(super) fn load(
     lines::for_each(&text, |statement| raw.read(file, &statement))?;
     drop(text);
     drop(bytes);
-    raw.check(file)?;
+    raw.check(file, sink)?;
     raw.warn(file, sink);
     let library = match overrides.all {
         Some(_) => BTreeMap::new(),
@@ -233,8 +234,28 @@ impl Raw {
         &self.corners[start..end]
     }
 
+    /// Indices into a list that the file does not have at all mean nothing.
+    fn forget_absent(&mut self, file: &str, sink: &mut Sink<'_>) {
+        let (no_uvs, no_normals) = (self.uvs.is_empty(), self.normals.is_empty());
+        let mut forgotten = 0;
+        for corner in &mut self.corners {
+            if no_uvs && corner.uv != NONE {
+                corner.uv = NONE;
+                forgotten += 1;
+            }
+            if no_normals && corner.normal != NONE {
+                corner.normal = NONE;
+                forgotten += 1;
+            }
+        }
+        if forgotten > 0 {
+            sink.warn(format!("{file}: {forgotten} indices of normals or texture coordinates ignored: the file has none"));
+        }
+    }
+
     /// Faces may stand before their vertices, so indices are checked at the end.
-    fn check(&self, file: &str) -> Result<(), LoadError> {
+    fn check(&mut self, file: &str, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+        self.forget_absent(file, sink);
         for (i, face) in self.faces.iter().enumerate() {
             for corner in self.corners_of(i) {
                 let lists = [
@@ -242,6 +263,11 @@ impl Raw {
                     (corner.uv, self.uvs.len(), "texture coordinate (vt)"),
                     (corner.normal, self.normals.len(), "normal (vn)"),
                 ];
+                let position = self.positions.get(corner.position as usize);
+                if position.is_some_and(|p| p.is_nan()) {
+                    let problem = format!("uses vertex {}, which is not a finite number", corner.position + 1);
+                    return Err(LoadError::broken(file, format!("line {}", face.line), problem));
+                }
                 for (index, count, what) in lists {
                     if index != NONE && index as usize >= count {
                         let problem = format!("index out of range: {what} {} of {count}", u64::from(index) + 1);
@@ -279,10 +305,19 @@ fn numbers<const N: usize>(text: &str) -> Result<([f32; N], usize), String> {
     Ok((values, count))
 }
 
-/// A number; `1.#INF` and the like of old compilers are not finite.
+/// A number. What is spelled as not finite (`nan`, `inf`, `1.#IND` of old compilers) is NaN; what is
+/// too large is infinite.
 fn number(word: &str) -> Option<f32> {
     let old = word.contains(".#IN") || word.contains(".#QNAN") || word.contains(".#SNAN");
-    if old { Some(f32::NAN) } else { word.parse::<f64>().ok().map(|value| value as f32) }
+    if old {
+        return Some(f32::NAN);
+    }
+    let lower = || word.trim_start_matches(['+', '-']).to_ascii_lowercase();
+    let Ok(value) = word.parse::<f64>() else {
+        return (lower().starts_with("nan") || lower().starts_with("inf")).then_some(f32::NAN);
+    };
+    let is_spelled = !value.is_finite() && !word.contains(|c: char| c.is_ascii_digit());
+    Some(if is_spelled { f32::NAN } else { value as f32 })
 }
 
 /// Index from 0 of what a face names from 1, or from the end if negative.
