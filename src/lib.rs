@@ -8,3 +8,5 @@ pub mod image;
 pub mod load;
 pub mod scene;
 pub mod trace;
+#[cfg(feature = "view")]
+pub mod view;
