@@ -201,8 +201,8 @@ impl<'a> Canvas<'a> {
         self.size / self.scale
     }
 
-    /// Darkens the dots from `min` up to `max`, so that white text is legible on anything.
-    fn plate(&mut self, min: UVec2, max: UVec2) {
+    /// Darkens the dots from `min` up to `max` by `darkness`, so that white text is legible on anything.
+    fn plate(&mut self, min: UVec2, max: UVec2, darkness: u8) {
         let (min, max) = (min * self.scale, (max * self.scale).min(self.size));
         for y in min.y..max.y {
             let row = (y * self.size.x) as usize * 4;
@@ -211,17 +211,17 @@ impl<'a> Canvas<'a> {
                 row + max.x.max(min.x) as usize * 4,
             );
             for pixel in self.rgba[from..to].chunks_exact_mut(4) {
-                pixel[..3].iter_mut().for_each(|c| *c /= 4);
+                pixel[..3].iter_mut().for_each(|c| *c /= darkness);
             }
         }
     }
 
     /// Writes `lines` as one block, broken where they are too long.
     pub fn write(&mut self, place: Place, lines: &[String]) {
-        self.write_in(&FONT_8X13, place, lines);
+        self.write_in(&FONT_8X13, place, lines, 4);
     }
 
-    fn write_in(&mut self, font: &MonoFont, place: Place, lines: &[String]) {
+    fn write_in(&mut self, font: &MonoFont, place: Place, lines: &[String], darkness: u8) {
         let glyph = UVec2::new(font.character_size.width, font.character_size.height);
         let room = self.dots().saturating_sub(UVec2::splat(2 * MARGIN));
         let columns = (room.x / glyph.x).max(1) as usize;
@@ -238,6 +238,7 @@ impl<'a> Canvas<'a> {
         self.plate(
             origin.saturating_sub(UVec2::splat(MARGIN)),
             origin + block + MARGIN,
+            darkness,
         );
         let style = MonoTextStyle::new(font, BinaryColor::On);
         for (line, y) in lines.iter().zip((origin.y..).step_by(glyph.y as usize)) {
@@ -258,7 +259,8 @@ impl<'a> Canvas<'a> {
             (needed * glyph).cmple(room).all()
         };
         let font = fonts.into_iter().find(fits).unwrap_or(&FONT_5X8);
-        self.write_in(font, Place::Middle, &lines);
+        // Darker, for there may be other text below.
+        self.write_in(font, Place::Middle, &lines, 16);
     }
 }
 

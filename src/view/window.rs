@@ -189,7 +189,7 @@ impl Viewer {
                     interrupt,
                     published,
                     ended,
-                })
+                });
             }
             Err(error) => drop(self.proxy.send_event(Wake::Crashed(error.to_string()))),
         }
@@ -420,7 +420,7 @@ impl Viewer {
                 }
             }
             Tap::Screenshot | Tap::ScreenshotWithHud => {
-                self.save_screenshot(tap == Tap::ScreenshotWithHud)
+                self.save_screenshot(tap == Tap::ScreenshotWithHud);
             }
             tap => {
                 let shift = self.held[Hold::Fast as usize];
