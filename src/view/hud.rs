@@ -89,11 +89,12 @@ pub fn status_lines(level: Level, status: &Status, measured: Measured) -> Vec<St
     if level == Level::None {
         return Vec::new();
     }
-    let noise = status
-        .noise
-        .map_or_else(|| "-".to_owned(), |n| significant(n * 100.0));
+    let noise = status.noise.map_or_else(
+        || "-".to_owned(),
+        |n| format!("{} %", significant(n * 100.0)),
+    );
     let mut first = format!(
-        "{} / {} spp   noise {noise} %   {} pictures/s   {} Mrays/s",
+        "{} / {} spp   noise {noise}   {} pictures/s   {} Mrays/s",
         samples(status.samples_per_pixel),
         status.sample_target,
         significant(measured.pictures_per_second),
@@ -330,7 +331,7 @@ mod tests {
 
     fn status() -> Status {
         Status {
-            samples_per_pixel: 2.25,
+            samples_per_pixel: 2.75,
             sample_target: 64,
             done: false,
             paused: false,
@@ -353,7 +354,7 @@ mod tests {
         let lines = status_lines(Level::Short, &status(), Measured::default());
         assert_eq!(
             lines[0],
-            "2.3 / 64 spp   noise - %   0 pictures/s   1.23 Mrays/s   preview 1/4"
+            "2.8 / 64 spp   noise -   0 pictures/s   1.23 Mrays/s   preview 1/4"
         );
         assert_eq!(lines[1], "exposure +0.33 EV   speed 0.500/s   H: help");
         let known = Status {
