@@ -108,22 +108,17 @@ impl Desktop {
             _turn: turn,
         };
         if has_tool("openbox") && has_tool("wmctrl") {
+            // A window that is mapped before the manager is ready stays hidden.
+            let ready = desktop.directory.join("ready");
             let manager = desktop
                 .command("openbox")
+                .args(["--startup", &format!("touch {}", ready.display())])
                 .stdout(Stdio::null())
                 .stderr(Stdio::null())
                 .spawn();
             desktop.manager = Some(manager.unwrap());
-            wait_for("the window manager", || {
-                desktop
-                    .command("wmctrl")
-                    .arg("-m")
-                    .output()
-                    .unwrap()
-                    .status
-                    .success()
-                    .then_some(())
-            });
+            wait_for("the window manager", || ready.exists().then_some(()));
+            pause(100);
         }
         desktop
     }
