@@ -78,7 +78,18 @@ fn event_loop() -> Result<EventLoop<Wake>, String> {
     // A missing libxkbcommon-x11 is a panic in there.
     screen::quietly(|| builder.build())
         .map_err(|panic| format!("a library is missing: {panic}"))?
-        .map_err(|e| e.to_string())
+        .map_err(|e| without_place(&e.to_string()).to_owned())
+}
+
+/// Without the source file and line that winit begins its messages with.
+fn without_place(message: &str) -> &str {
+    match message
+        .strip_prefix("os error at ")
+        .and_then(|rest| rest.split_once(": "))
+    {
+        Some((_, what)) => what,
+        None => message,
+    }
 }
 
 /// Chooses X11 if the Wayland display that the environment names does not answer: the event loop
@@ -115,4 +126,21 @@ fn prefer_what_is_there(builder: &mut EventLoopBuilder<Wake>) -> Result<(), Stri
 #[cfg(not(target_os = "linux"))]
 fn prefer_what_is_there(_: &mut EventLoopBuilder<Wake>) -> Result<(), String> {
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_tell_what_is_wrong_and_not_where_in_the_source() {
+        assert_eq!(
+            without_place("os error at /a/b.rs:7: no display: :9"),
+            "no display: :9"
+        );
+        assert_eq!(
+            without_place("the requested operation is not supported"),
+            "the requested operation is not supported"
+        );
+    }
 }

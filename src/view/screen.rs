@@ -1,6 +1,7 @@
 //! The window and the surface that its pixels are presented on.
 
 use super::engine::{lock, panic_message};
+use super::without_place;
 use glam::UVec2;
 use pixels::wgpu::{DeviceType, SurfaceError};
 use pixels::{Error, Pixels, SurfaceTexture};
@@ -50,7 +51,7 @@ impl Screen {
         );
         let window = event_loop
             .create_window(attributes)
-            .map_err(|e| format!("cannot open a window: {e}"))?;
+            .map_err(|e| format!("cannot open a window: {}", without_place(&e.to_string())))?;
         let window = Arc::new(window);
         let size = vector(window.inner_size()).max(UVec2::ONE);
         let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(&window));

@@ -35,7 +35,7 @@ const SOFTWARE_PACE: Duration = Duration::from_millis(80);
 const TITLE_PACE: Duration = Duration::from_millis(500);
 /// How long a notice stays.
 const NOTICE: Duration = Duration::from_secs(6);
-/// How long a closing window waits for the engine to stop. A scene that loads cannot be interrupted.
+/// How long a closing window waits for the engine to stop.
 const FAREWELL: Duration = Duration::from_secs(2);
 /// Latencies that the median is taken of.
 const LATENCIES: usize = 31;
@@ -151,7 +151,10 @@ impl Viewer {
         if let Some(engine) = self.engine {
             let _ = engine.commands.send(Command::Quit);
             engine.interrupt.store(true, Ordering::SeqCst);
-            let _: Result<Infallible, RecvTimeoutError> = engine.ended.recv_timeout(FAREWELL);
+            // A scene that still loads cannot be interrupted, and has nothing to tidy up.
+            if self.status.is_some() {
+                let _: Result<Infallible, RecvTimeoutError> = engine.ended.recv_timeout(FAREWELL);
+            }
         }
         self.failure.map_or(Ok(()), Err)
     }
@@ -466,14 +469,9 @@ impl Viewer {
         let Some(screen) = &self.screen else { return };
         if on && self.drag.is_none() {
             self.drag = Some(self.cursor);
-            // X11 cannot lock the pointer: it is confined, and put back to the middle.
-            if screen
-                .window
-                .set_cursor_grab(CursorGrabMode::Locked)
-                .is_err()
-            {
-                let _ = screen.window.set_cursor_grab(CursorGrabMode::Confined);
-            }
+            // X11 cannot lock the pointer: it is put back to the middle instead. Confining it as well
+            // would deliver each of its motions twice.
+            let _ = screen.window.set_cursor_grab(CursorGrabMode::Locked);
             screen.window.set_cursor_visible(false);
         } else if !on && let Some(start) = self.drag.take() {
             let _ = screen.window.set_cursor_position(start);
