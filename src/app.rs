@@ -1,11 +1,17 @@
 //! The World and the one list of systems.
 
-use crate::image::{Display, Picture};
-use crate::load::{LoadOptions, LoadReport, SceneSource};
-use crate::scene::{ActiveCamera, Camera, Transform};
-use crate::trace::{Film, RenderSettings};
+use crate::image::develop::{Display, Picture, develop};
+use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
+use crate::preview::Preview;
+use crate::scene::propagate_transforms;
+use crate::sync::{self, Redone, RenderOrigin, SurfaceNumbers};
+use crate::trace::noise::relative_noise;
+use crate::trace::{
+    Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
+};
 use bevy_ecs::prelude::*;
-use bevy_ecs::schedule::ScheduleLabel;
+use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
+use bevy_ecs::system::ScheduleSystem;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -32,20 +38,23 @@ pub enum FrameSystems {
 /// How much a frame may trace. Set by whoever runs frames.
 #[derive(Resource, Clone, Debug)]
 pub struct FrameBudget {
-    /// Time for refinement; a frame ends at the first tile after it. `None`: a whole pass.
+    /// Time for refinement; a frame ends at the first tile after it. `None`: one pass, whatever it takes.
     pub time: Option<Duration>,
     /// Raised from outside to end refinement at the next tile (a key was pressed). The frame's
     /// runner lowers it. A preview, once begun, always completes.
     pub interrupt: Arc<AtomicBool>,
     /// Samples per pixel after which nothing more is traced.
     pub sample_target: u32,
-    /// Trace a coarse whole picture first when the film has been reset.
+    /// Samples per pixel of one pass, if there is no time limit.
+    pub pass_samples: u32,
+    /// For somebody who watches: a coarse whole picture first when the film was reset, and a developed
+    /// [`Picture`] at the end of each frame.
     pub preview: bool,
 }
 
 impl Default for FrameBudget {
     fn default() -> Self {
-        Self { time: None, interrupt: Arc::default(), sample_target: 64, preview: false }
+        Self { time: None, interrupt: Arc::default(), sample_target: 64, pass_samples: 1, preview: false }
     }
 }
 
@@ -58,14 +67,16 @@ pub struct FrameStats {
     pub done: bool,
     /// Estimated relative noise of the picture (0.02 = 2 %), from two samples per pixel on.
     pub noise: Option<f64>,
-    /// Rays of all kinds since the program started.
-    pub rays: u64,
-    /// Rays per second of tracing time, lately.
+    /// Samples per pixel that `noise` is of.
+    noise_samples: u32,
+    /// Rays since the world was made, by kind.
+    pub rays: RayCounts,
+    /// Seconds spent tracing since the world was made.
+    pub trace_seconds: f64,
+    /// Rays of all kinds per second of tracing time, lately.
     pub rays_per_second: f64,
-    /// Side of a preview pixel, if the picture is a preview.
+    /// Side of a preview pixel, if the picture is still partly a preview.
     pub preview_scale: Option<u32>,
-    /// How often the film was reset.
-    pub resets: u64,
     /// Samples dropped because they were not finite.
     pub dropped: u64,
 }
@@ -77,30 +88,44 @@ pub struct App {
 }
 
 impl App {
-    /// A world with `source` loaded.
-    ///
-    /// # Errors
-    /// If the scene cannot be loaded.
-    pub fn open(_source: &SceneSource, _options: &LoadOptions, settings: RenderSettings) -> Result<(Self, LoadReport), String> {
+    /// A world with no entity in it yet.
+    #[must_use]
+    pub fn new(settings: RenderSettings) -> Self {
         let mut world = World::new();
         world.insert_resource(settings);
         world.insert_resource(Film::new(settings.size, 0));
         world.init_resource::<Display>();
         world.init_resource::<Picture>();
+        world.init_resource::<Preview>();
         world.init_resource::<FrameBudget>();
         world.init_resource::<FrameStats>();
-        let camera = world.spawn((Camera::default(), Transform::default())).id();
-        world.insert_resource(ActiveCamera(camera));
-        let mut frame = Schedule::new(Frame);
-        frame.configure_sets((FrameSystems::Input, FrameSystems::Update, FrameSystems::Sync, FrameSystems::Trace, FrameSystems::Present).chain());
-        frame.add_systems(crate::scene::propagate_transforms.in_set(FrameSystems::Update));
-        frame.add_systems(stub.in_set(FrameSystems::Trace));
-        world.add_schedule(frame);
-        Ok((Self { world }, LoadReport::default()))
+        world.init_resource::<Geometry>();
+        world.init_resource::<Surfaces>();
+        world.init_resource::<Lights>();
+        world.init_resource::<Viewpoint>();
+        world.init_resource::<RenderOrigin>();
+        world.init_resource::<SurfaceNumbers>();
+        world.init_resource::<Redone>();
+        world.add_schedule(frame_schedule());
+        Self { world }
     }
 
-    /// Adds a system to the frame, in its set (the window's are added here).
-    pub fn add_systems<M>(&mut self, systems: impl IntoScheduleConfigs<bevy_ecs::system::ScheduleSystem, M>) {
+    /// A world with `source` loaded.
+    ///
+    /// # Errors
+    /// If the scene cannot be loaded.
+    pub fn open(
+        source: &SceneSource,
+        options: &LoadOptions,
+        settings: RenderSettings,
+    ) -> Result<(Self, LoadReport), LoadError> {
+        let mut app = Self::new(settings);
+        let report = load(&mut app.world, source, options)?;
+        Ok((app, report))
+    }
+
+    /// Adds systems to the frame, each in its set.
+    pub fn add_systems<M>(&mut self, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
         self.world.schedule_scope(Frame, |_, schedule| {
             schedule.add_systems(systems);
         });
@@ -114,32 +139,109 @@ impl App {
     }
 }
 
-fn stub(
+/// The one list of systems.
+fn frame_schedule() -> Schedule {
+    use FrameSystems::{Input, Present, Sync, Trace, Update};
+    let mut frame = Schedule::new(Frame);
+    // Eight short systems: threads are for the tiles, which rayon spreads inside `trace_frame`.
+    frame.set_executor(SingleThreadedExecutor::new());
+    frame.configure_sets((Input, Update, Sync, Trace, Present).chain());
+    frame.add_systems((
+        propagate_transforms.in_set(Update),
+        (
+            sync::build_blas,
+            sync::choose_origin,
+            sync::sync_surfaces,
+            sync::sync_geometry,
+            sync::sync_lights,
+            sync::sync_viewpoint,
+            sync::reset_film,
+        )
+            .chain()
+            .in_set(Sync),
+        trace_frame.in_set(Trace),
+        develop_film.run_if(|budget: Res<FrameBudget>| budget.preview).in_set(Present),
+    ));
+    frame
+}
+
+/// Adds samples to the film within the budget; first of all a preview, if somebody watches.
+#[expect(clippy::too_many_arguments, reason = "the six inputs of the picture, the film and its budget")]
+pub fn trace_frame(
+    geometry: Res<Geometry>,
+    surfaces: Res<Surfaces>,
+    lights: Res<Lights>,
+    viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
     budget: Res<FrameBudget>,
-    camera: Query<Ref<crate::scene::GlobalTransform>, With<Camera>>,
-    mut picture: ResMut<Picture>,
+    mut film: ResMut<Film>,
+    mut preview: ResMut<Preview>,
     mut stats: ResMut<FrameStats>,
+    redone: Res<Redone>,
+    mut previewed: Local<u64>,
 ) {
-    let start = Instant::now();
-    let Ok(camera) = camera.single() else { return };
-    if camera.is_changed() || picture.size != settings.size {
-        stats.samples_per_pixel = 0.0;
+    let scene = TraceScene {
+        geometry: &geometry,
+        surfaces: &surfaces,
+        lights: &lights,
+        viewpoint: &viewpoint,
+        settings: &settings,
+    };
+    let until = film.first_sample().saturating_add(budget.sample_target);
+    let mut start = Instant::now();
+    let mut seconds = 0.0;
+    let mut rays = RayCounts::default();
+    // Once for each reset: a preview that came anew each frame would leave no time for anything else.
+    if std::mem::replace(&mut *previewed, redone.resets) != redone.resets {
+        stats.noise = None;
+        stats.noise_samples = 0;
+        if budget.preview {
+            match preview.trace(&scene) {
+                Some(counts) => rays = rays + counts,
+                // So cheap that the film's own first pass is the preview.
+                None => {
+                    let once = until.min(film.first_sample() + 1);
+                    rays = rays + trace_pass(&scene, &mut film, once, 1, || true);
+                    preview.note(start.elapsed(), f64::from(settings.size.element_product()));
+                }
+            }
+            seconds = start.elapsed().as_secs_f64();
+            start = Instant::now();
+        }
     }
-    stats.done = stats.samples_per_pixel >= f64::from(budget.sample_target);
-    if stats.done {
-        return;
+    let in_time = || budget.time.is_none_or(|time| start.elapsed() < time);
+    let keep_going = || in_time() && !budget.interrupt.load(Ordering::Relaxed);
+    while film.complete_samples() < budget.sample_target && keep_going() {
+        rays = rays + trace_pass(&scene, &mut film, until, budget.pass_samples, keep_going);
+        if budget.time.is_none() {
+            break;
+        }
     }
-    let p = camera.0.translation;
-    let (w, h) = (settings.size.x, settings.size.y);
-    picture.size = settings.size;
-    picture.rgba = (0..h)
-        .flat_map(|y| (0..w).map(move |x| (x, y)))
-        .flat_map(|(x, y)| [(x as f64 + p.x * 100.0) as u8, (y as f64 + p.y * 100.0) as u8, (p.z * 50.0) as u8, 255])
-        .collect();
-    picture.version += 1;
-    stats.samples_per_pixel += 1.0;
-    while start.elapsed() < budget.time.unwrap_or_default() && !budget.interrupt.load(Ordering::Relaxed) {
-        std::thread::yield_now();
+    seconds += start.elapsed().as_secs_f64();
+    stats.rays = stats.rays + rays;
+    stats.trace_seconds += seconds;
+    if rays.total() > 0 {
+        stats.rays_per_second = rays.total() as f64 / seconds;
+    }
+    stats.samples_per_pixel = film.mean_samples();
+    stats.done = film.complete_samples() >= budget.sample_target;
+    stats.preview_scale = (film.complete_samples() == 0).then(|| preview.scale()).filter(|&s| s > 1);
+    stats.dropped = film.dropped();
+    // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter.
+    let complete = film.complete_samples();
+    if complete >= 2 && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
+        && complete != stats.noise_samples
+    {
+        stats.noise = relative_noise(&film);
+        stats.noise_samples = complete;
+    }
+}
+
+/// Film → [`Picture`], when either it or the way of showing it has changed.
+pub fn develop_film(film: Res<Film>, preview: Res<Preview>, display: Res<Display>, mut picture: ResMut<Picture>) {
+    if film.is_changed() || display.is_changed() {
+        picture.size = film.size();
+        picture.rgba = develop(&film, preview.film(), &display);
+        picture.version += 1;
     }
 }

@@ -4,9 +4,12 @@
 //! [`trace`] → film → [`image`](mod@image) → file or screen. [`app`] holds the one list of systems.
 
 pub mod app;
+pub mod bvh;
 pub mod image;
 pub mod load;
+pub mod preview;
 pub mod scene;
+pub mod sync;
 pub mod trace;
 #[cfg(feature = "view")]
 pub mod view;

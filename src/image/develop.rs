@@ -1,7 +1,11 @@
 //! Linear radiance → bytes on a screen: exposure, tone map, sRGB, dither. Never touches the film.
 
 use bevy_ecs::prelude::*;
+use crate::scene::color::srgb_from_linear;
+use crate::trace::Film;
+use crate::trace::sampler::{hash, unit_float};
 use glam::{UVec2, Vec3};
+use rayon::prelude::*;
 
 /// How the film is shown. Changing it restarts nothing.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
@@ -33,19 +37,6 @@ pub struct Picture {
     pub version: u64,
 }
 
-/// The sRGB transfer function (IEC 61966-2-1) of a linear value; outside 0..=1 is clamped, NaN is 0.
-#[must_use]
-pub fn srgb_from_linear(linear: f32) -> f32 {
-    let linear = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// The inverse of [`srgb_from_linear`].
-#[must_use]
-pub fn linear_from_srgb(srgb: f32) -> f32 {
-    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
-}
-
 impl ToneMap {
     /// Maps exposed linear radiance to linear display values; what is still outside 0..=1 clips.
     ///
@@ -57,6 +48,38 @@ impl ToneMap {
             Self::Neutral => neutral(color),
         }
     }
+}
+
+/// The film as sRGB bytes, RGBA, rows from the top.
+///
+/// Where a pixel has no sample yet, `coarse` (a smaller film of the same view) shows through.
+/// Rounding to bytes is dithered by a fixed pattern of up to half a step, so that slow gradients don't
+/// show bands and the same film always gives the same bytes.
+#[must_use]
+pub fn develop(film: &Film, coarse: Option<&Film>, display: &Display) -> Vec<u8> {
+    let size = film.size();
+    let gain = display.exposure.exp2();
+    let mut bytes = vec![255; size.element_product() as usize * 4];
+    bytes.par_chunks_exact_mut(size.x as usize * 4).zip(0..size.y).for_each(|(row, y)| {
+        for (x, rgba) in (0..size.x).zip(row.chunks_exact_mut(4)) {
+            let mut pixel = film.pixel(x, y);
+            if let (0, Some(coarse)) = (pixel.count(), coarse) {
+                let small = coarse.size();
+                pixel = coarse.pixel(x * small.x / size.x, y * small.y / size.y);
+            }
+            // After exposure, before the curve: even an infinity is white, not NaN.
+            let exposed = (pixel.mean().as_vec3() * gain).clamp(Vec3::ZERO, Vec3::splat(1e6));
+            let shown = display.tone_map.apply(exposed);
+            let dither = unit_float(hash(x ^ hash(y))) - 0.5;
+            for (byte, linear) in rgba.iter_mut().zip(shown.to_array()) {
+                let level = srgb_from_linear(linear) * 255.0;
+                // Black and white stay what they are.
+                let dithered = if level > 0.0 && level < 255.0 { level + dither } else { level };
+                *byte = dithered.round().clamp(0.0, 255.0) as u8;
+            }
+        }
+    });
+    bytes
 }
 
 fn neutral(color: Vec3) -> Vec3 {

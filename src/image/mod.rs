@@ -1,5 +1,8 @@
 //! Film → picture → file, and the comparison of two pictures.
 
+pub mod compare;
 pub mod develop;
+pub mod files;
 
 pub use develop::{Display, Picture, ToneMap};
+pub use files::{ImageError, PictureFormat, save};

@@ -3,13 +3,16 @@
 //! Everything is linear: lengths in scene units (glTF: metres), angles in radians, colours and
 //! radiances as linear RGB with Rec. 709 primaries. The world is right-handed, +Y up.
 
+pub mod bounds;
 pub mod camera;
+pub mod color;
 pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod texture;
 pub mod transform;
 
+pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Projection};
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, TextureUse};

@@ -97,15 +97,22 @@ pub struct Tile {
     pub next_sample: u32,
     /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
     pub dropped: u64,
+    /// What the pixels hold is from before the last reset.
+    stale: bool,
     pixels: Vec<Pixel>,
 }
 
 impl Tile {
     /// Rows from the top.
     pub fn pixels_mut(&mut self) -> &mut [Pixel] {
+        if std::mem::take(&mut self.stale) {
+            self.pixels.fill(Pixel::default());
+        }
         &mut self.pixels
     }
 }
+
+static EMPTY: Pixel = Pixel { sums: [[Sum(0); 3]; 2], counts: [0; 2] };
 
 /// The accumulated picture.
 #[derive(Resource, Clone, Debug, PartialEq, Eq)]
@@ -126,20 +133,26 @@ impl Film {
             .map(|origin| {
                 let size = (size - origin).min(UVec2::splat(TILE));
                 let pixels = vec![Pixel::default(); size.element_product() as usize];
-                Tile { origin, size, next_sample: first_sample, dropped: 0, pixels }
+                Tile { origin, size, next_sample: first_sample, dropped: 0, stale: false, pixels }
             })
             .collect();
         Self { size, first_sample, tiles }
     }
 
-    /// Forgets all samples.
+    /// Forgets all samples, in no time: a tile is cleared when it is next worked on.
     pub fn reset(&mut self) {
         let first_sample = self.first_sample;
         for tile in &mut self.tiles {
             tile.next_sample = first_sample;
             tile.dropped = 0;
-            tile.pixels.fill(Pixel::default());
+            tile.stale = true;
         }
+    }
+
+    /// Index of the first sample that each pixel gets.
+    #[must_use]
+    pub fn first_sample(&self) -> u32 {
+        self.first_sample
     }
 
     /// Width and height in pixels.
@@ -164,7 +177,7 @@ impl Film {
     pub fn pixel(&self, x: u32, y: u32) -> &Pixel {
         let across = self.size.x.div_ceil(TILE);
         let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
-        &tile.pixels[(y % TILE * tile.size.x + x % TILE) as usize]
+        if tile.stale { &EMPTY } else { &tile.pixels[(y % TILE * tile.size.x + x % TILE) as usize] }
     }
 
     /// Samples that every pixel has.

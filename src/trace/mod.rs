@@ -1,7 +1,25 @@
-//! How light travels: functions over flat arrays. No ECS below the doc comments, no files, no clock.
+//! How light travels: functions over flat arrays. No entities, no files, no clock.
+//!
+//! [`pass::trace_pass`] takes the tiles of the [`Film`] one by one; [`integrator`] follows all rays of
+//! a tile together, wave by wave, through [`TraceScene`].
 
+pub mod bsdf;
+pub mod camera;
 pub mod film;
+pub mod integrator;
+pub mod light;
+pub mod lights;
+pub mod noise;
+pub mod pass;
+pub mod sampler;
+pub mod scene;
 pub mod settings;
+pub mod surface;
+pub mod texture;
 
+pub use camera::Viewpoint;
 pub use film::Film;
+pub use lights::Lights;
+pub use pass::{RayCounts, trace_pass};
+pub use scene::{Geometry, Surfaces, TraceScene};
 pub use settings::{Integrator, RenderSettings};

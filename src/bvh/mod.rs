@@ -1,0 +1,20 @@
+//! How a ray finds what it hits: geometry only. Knows no material, light or entity.
+//!
+//! Two levels of pointer-free bounding volume hierarchies: a [`Blas`] over the triangles of each
+//! mesh, a [`Tlas`] over their placed instances. Watertight, without an absolute epsilon: the
+//! bounds of all rounding errors follow from the ray and the size of what it is tested against.
+
+pub mod aabb;
+pub mod blas;
+pub mod build;
+pub mod probe;
+pub mod ray;
+pub mod tlas;
+pub mod traverse;
+
+pub use aabb::Aabb;
+pub use blas::Blas;
+pub use build::{Bvh, Defect, Node};
+pub use probe::Probe;
+pub use ray::{Hit, Ray};
+pub use tlas::{Placement, Tlas};

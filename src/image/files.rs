@@ -1,0 +1,108 @@
+//! Pictures on disk.
+
+use super::develop::Display;
+use super::develop::develop;
+use crate::trace::Film;
+use glam::Vec3;
+use image::{ImageFormat, Rgb32FImage, RgbaImage};
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+/// Why a picture could not be written or read. The message names the file.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The name's ending is neither `.png` nor `.exr`.
+    #[error("{}: pictures are written as .png (developed, 8 bit) or .exr (linear, 32 bit float); give it one of these endings", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Its reason.
+        source: std::io::Error,
+    },
+    /// Not a picture, or a broken one.
+    #[error("{}: {source}", path.display())]
+    Codec {
+        /// The file.
+        path: PathBuf,
+        /// The codec's reason.
+        source: image::ImageError,
+    },
+}
+
+/// What a file name asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// Developed, sRGB, 8 bit.
+    Png,
+    /// Linear Rec. 709 radiance, 32 bit float.
+    Exr,
+}
+
+impl PictureFormat {
+    /// By the ending of `path`.
+    ///
+    /// # Errors
+    /// If it is neither `.png` nor `.exr`.
+    pub fn of(path: &Path) -> Result<Self, ImageError> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match ending.as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(ImageError::UnknownFormat { path: path.to_path_buf() }),
+        }
+    }
+}
+
+/// Writes the film to `path`, developed or linear by its ending. The file appears whole or not at all.
+///
+/// # Errors
+/// If the ending is unknown or the file cannot be written.
+pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageError> {
+    let format = PictureFormat::of(path)?;
+    let size = film.size();
+    let mut bytes = Cursor::new(Vec::new());
+    let codec = |source| ImageError::Codec { path: path.to_path_buf(), source };
+    match format {
+        PictureFormat::Png => {
+            let image = RgbaImage::from_raw(size.x, size.y, develop(film, None, display)).unwrap_or_default();
+            let image = image::DynamicImage::from(image).into_rgb8();
+            image.write_to(&mut bytes, ImageFormat::Png).map_err(codec)?;
+        }
+        PictureFormat::Exr => {
+            let linear = linear_pixels(film).into_iter().flat_map(|p| p.to_array()).collect();
+            let image = Rgb32FImage::from_raw(size.x, size.y, linear).unwrap_or_default();
+            image.write_to(&mut bytes, ImageFormat::OpenExr).map_err(codec)?;
+        }
+    }
+    write_whole(path, bytes.get_ref())
+}
+
+/// Mean radiances, rows from the top.
+#[must_use]
+pub fn linear_pixels(film: &Film) -> Vec<Vec3> {
+    let size = film.size();
+    (0..size.y).flat_map(|y| (0..size.x).map(move |x| film.pixel(x, y).mean().as_vec3())).collect()
+}
+
+/// Writes beside `path` and renames, so that nobody ever sees half a file.
+///
+/// # Errors
+/// If the file system refuses.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+    let io = |source| ImageError::Io { path: path.to_path_buf(), source };
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.part", std::process::id()));
+    let part = path.with_file_name(name);
+    std::fs::write(&part, bytes).map_err(io)?;
+    std::fs::rename(&part, path).map_err(|source| {
+        // The reason for the failure matters more than what is left over.
+        let _ = std::fs::remove_file(&part);
+        io(source)
+    })
+}

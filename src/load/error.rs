@@ -1,0 +1,93 @@
+//! Why a scene cannot be shown: one line, naming the file, the place in it and the way out.
+
+use std::fmt::Display;
+use thiserror::Error;
+
+/// Why [`super::load`] gave up.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The scene's own file cannot be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// As the caller named it.
+        file: String,
+        /// What is wrong with it.
+        source: ReadError,
+    },
+    /// Neither a file nor a built-in scene.
+    #[error("{argument}: no such file, and no built-in scene of that name{hint}; built-in scenes: {names}")]
+    UnknownScene {
+        /// What was asked for.
+        argument: String,
+        /// `; did you mean ...?` or nothing.
+        hint: String,
+        /// All built-in scenes.
+        names: String,
+    },
+    /// The ending says nothing, nor do the first bytes.
+    #[error("{file}: cannot tell its format; Penumbra reads .gltf, .glb, .obj and .toml")]
+    UnknownFormat {
+        /// The file.
+        file: String,
+    },
+    /// A required glTF extension is not supported.
+    #[error("{file}: needs {extension}, which Penumbra cannot read; {way_out}")]
+    Extension {
+        /// The file.
+        file: String,
+        /// Its name, e.g. `KHR_draco_mesh_compression`.
+        extension: String,
+        /// What the user can do.
+        way_out: &'static str,
+    },
+    /// The content is damaged or contradicts itself.
+    #[error("{file}: {place}: {problem}")]
+    Broken {
+        /// The file.
+        file: String,
+        /// Line, node, accessor, mesh ...
+        place: String,
+        /// What is wrong there, and what to do if that is known.
+        problem: String,
+    },
+}
+
+/// Why a file cannot be read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// It is not there.
+    #[error("no such file")]
+    Missing,
+    /// A directory, pipe or device.
+    #[error("is not a regular file")]
+    NotAFile,
+    /// Longer than its kind may be.
+    #[error("is {length} bytes long; Penumbra reads at most {limit} of such a file")]
+    TooLarge {
+        /// Bytes it has.
+        length: u64,
+        /// Bytes it may have.
+        limit: u64,
+    },
+    /// The reference leaves the folder of the scene.
+    #[error("lies outside the scene's folder and is not opened")]
+    Outside,
+    /// The reference is a URL.
+    #[error("is a URI with the scheme `{0}`, which is not opened; put the file beside the scene")]
+    Scheme(String),
+    /// The operating system says no.
+    #[error("cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    /// A `data:` URI that cannot be decoded.
+    #[error("{0}")]
+    Data(&'static str),
+}
+
+impl LoadError {
+    /// [`LoadError::Broken`] from anything printable.
+    pub(super) fn broken(file: &str, place: impl Display, problem: impl Display) -> Self {
+        Self::Broken { file: file.to_owned(), place: place.to_string(), problem: problem.to_string() }
+    }
+}

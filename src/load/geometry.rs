@@ -1,0 +1,219 @@
+//! From what a file says about triangles to a [`TriangleMesh`] that keeps its promises.
+
+use crate::scene::TriangleMesh;
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+/// Coordinates beyond this are left out: their products overflow single precision.
+const FAR: f32 = 1e18;
+
+/// One primitive: the attributes that are there have one entry a vertex.
+#[derive(Default)]
+pub(super) struct Part {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) normals: Option<Vec<Vec3>>,
+    pub(super) uvs: Option<Vec<Vec2>>,
+    pub(super) colors: Option<Vec<Vec4>>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) slot: u16,
+}
+
+/// A finished mesh and what happened on the way.
+pub(super) struct Finished {
+    pub(super) mesh: TriangleMesh,
+    /// Triangles before those without area were dropped.
+    pub(super) triangles: usize,
+    pub(super) mended: Mended,
+}
+
+/// How many things had to be mended.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Mended {
+    pub(super) not_finite: usize,
+    pub(super) too_far: usize,
+    pub(super) without_area: usize,
+    pub(super) normals: usize,
+    pub(super) uvs: usize,
+    pub(super) colors: usize,
+}
+
+impl Mended {
+    /// One line for each kind.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let kinds = [
+            (self.not_finite, "triangles dropped: a position is not finite"),
+            (self.too_far, "triangles dropped: a position is beyond the range of 1e18"),
+            (self.without_area, "triangles without area dropped"),
+            (self.normals, "vertex normals zero or not finite, replaced by those of the faces"),
+            (self.uvs, "texture coordinates not finite, set to 0"),
+            (self.colors, "vertex colours not finite, set to white"),
+        ];
+        kinds.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect()
+    }
+}
+
+/// Puts primitives into one mesh. Where only some have an attribute, the others get its neutral
+/// value; one without normals beside others with them gets its own vertices and face normals.
+pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
+    let any_normals = parts.iter().any(|part| part.normals.is_some());
+    let any_uvs = parts.iter().any(|part| part.uvs.is_some());
+    let any_colors = parts.iter().any(|part| part.colors.is_some());
+    let several_slots = parts.iter().any(|part| part.slot != 0);
+    let mut mesh = TriangleMesh::default();
+    for mut part in parts {
+        if any_normals && part.normals.is_none() {
+            part = faceted(&part);
+        }
+        let first = mesh.positions.len() as u32;
+        let count = part.positions.len();
+        mesh.triangles.extend(part.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+        if several_slots {
+            mesh.slots.resize(mesh.triangles.len(), part.slot);
+        }
+        mesh.positions.append(&mut part.positions);
+        if any_normals {
+            mesh.normals.extend(part.normals.unwrap_or_else(|| vec![Vec3::ZERO; count]));
+        }
+        if any_uvs {
+            mesh.uvs.extend(part.uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
+        }
+        if any_colors {
+            mesh.colors.extend(part.colors.unwrap_or_else(|| vec![Vec4::ONE; count]));
+        }
+    }
+    mesh
+}
+
+/// Three vertices of its own for each triangle, with the normal of the face.
+fn faceted(part: &Part) -> Part {
+    let corners = || part.triangles.iter().flatten().map(|&corner| corner as usize);
+    let positions: Vec<Vec3> = corners().map(|corner| part.positions[corner]).collect();
+    let (faces, _) = positions.as_chunks::<3>();
+    let normals = faces.iter().flat_map(|&face| [unit_normal(face).unwrap_or(Vec3::ZERO); 3]).collect();
+    Part {
+        normals: Some(normals),
+        uvs: part.uvs.as_ref().map(|uvs| corners().map(|corner| uvs[corner]).collect()),
+        colors: part.colors.as_ref().map(|colors| corners().map(|corner| colors[corner]).collect()),
+        triangles: (0..part.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        positions,
+        slot: part.slot,
+    }
+}
+
+/// Unit normal of a counter-clockwise triangle, if it has an area in double precision.
+pub(super) fn unit_normal(corners: [Vec3; 3]) -> Option<Vec3> {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    let (ab, ac) = (b - a, c - a);
+    let longest = ab.abs().max_element().max(ac.abs().max_element());
+    (ab / longest).cross(ac / longest).try_normalize().map(|normal| normal.as_vec3())
+}
+
+/// Drops what cannot be traced and mends what can, so that every promise of [`TriangleMesh`] holds.
+pub(super) fn finish(mut mesh: TriangleMesh) -> Finished {
+    let mut mended = Mended::default();
+    mended.not_finite = retain(&mut mesh, |corners| corners.iter().all(|p| p.is_finite()));
+    let triangles = mesh.triangles.len();
+    mended.too_far = retain(&mut mesh, |corners| corners.iter().all(|p| p.abs().max_element() <= FAR));
+    mended.without_area = mesh.drop_degenerate();
+    mend_normals(&mut mesh, &mut mended);
+    for uv in &mut mesh.uvs {
+        if !uv.is_finite() {
+            *uv = Vec2::ZERO;
+            mended.uvs += 1;
+        }
+    }
+    for color in &mut mesh.colors {
+        if !color.is_finite() {
+            *color = Vec4::ONE;
+            mended.colors += 1;
+        }
+        *color = color.clamp(Vec4::ZERO, Vec4::ONE);
+    }
+    Finished { mesh, triangles, mended }
+}
+
+/// Keeps the triangles whose corners pass; returns how many do not.
+fn retain(mesh: &mut TriangleMesh, mut pass: impl FnMut([Vec3; 3]) -> bool) -> usize {
+    let keep: Vec<bool> = (0..mesh.triangles.len()).map(|i| pass(mesh.corners(i))).collect();
+    let dropped = keep.iter().filter(|&&kept| !kept).count();
+    if dropped > 0 {
+        let mut kept = keep.iter().copied();
+        mesh.triangles.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = keep.iter().copied();
+        mesh.slots.retain(|_| kept.next().unwrap_or(true));
+    }
+    dropped
+}
+
+/// Unit length for all; what has no direction gets the mean normal of its faces.
+fn mend_normals(mesh: &mut TriangleMesh, mended: &mut Mended) {
+    let mut broken = vec![false; mesh.normals.len()];
+    for (normal, broken) in mesh.normals.iter_mut().zip(&mut broken) {
+        match normal.as_dvec3().try_normalize() {
+            Some(unit) => *normal = unit.as_vec3(),
+            None => {
+                *broken = true;
+                *normal = Vec3::ZERO;
+            }
+        }
+    }
+    mended.normals = broken.iter().filter(|&&b| b).count();
+    if mended.normals == 0 {
+        return;
+    }
+    let mut sums = vec![DVec3::ZERO; mesh.normals.len()];
+    for (i, corners) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(i).map(|p| p.as_dvec3());
+        for &corner in corners {
+            sums[corner as usize] += (b - a).cross(c - a);
+        }
+    }
+    for ((normal, sum), _) in mesh.normals.iter_mut().zip(sums).zip(broken).filter(|(_, broken)| *broken) {
+        *normal = sum.try_normalize().unwrap_or(DVec3::Y).as_vec3();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(offset: f32) -> Part {
+        Part {
+            positions: [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]].map(|p| Vec3::from(p) + offset).to_vec(),
+            triangles: vec![[0, 1, 2]],
+            ..Part::default()
+        }
+    }
+
+    #[test]
+    fn a_part_without_normals_gets_face_normals_beside_one_with() {
+        let smooth = Part { normals: Some(vec![Vec3::X; 3]), slot: 1, ..triangle(0.0) };
+        let mesh = merge(vec![smooth, triangle(5.0)]);
+        assert_eq!(mesh.normals, [[Vec3::X; 3], [Vec3::Z; 3]].concat());
+        assert_eq!(mesh.slots, [1, 0]);
+        assert_eq!(mesh.triangles[1], [3, 4, 5]);
+    }
+
+    #[test]
+    fn triangles_that_are_not_finite_go_before_the_count_and_flat_ones_after() {
+        let mut flat = triangle(0.0);
+        flat.positions[2] = flat.positions[1];
+        let mut far = triangle(0.0);
+        far.positions[0].x = f32::NAN;
+        let done = finish(merge(vec![flat, far, triangle(0.0)]));
+        assert_eq!((done.triangles, done.mesh.triangles.len()), (2, 1));
+        assert_eq!((done.mended.not_finite, done.mended.without_area), (1, 1));
+    }
+
+    #[test]
+    fn zero_normals_become_face_normals() {
+        let part = Part { normals: Some(vec![Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X * 3.0]), ..triangle(0.0) };
+        let done = finish(merge(vec![part]));
+        assert_eq!(done.mesh.normals, [Vec3::Z, Vec3::Z, Vec3::X]);
+    }
+
+    #[test]
+    fn a_sliver_has_its_normal() {
+        let normal = unit_normal([Vec3::ZERO, Vec3::X * 1e6, Vec3::new(5e5, 1e-6, 0.0)]);
+        assert!(normal.is_some_and(|n| (n - Vec3::Z).length() < 1e-6));
+    }
+}

@@ -1,0 +1,155 @@
+//! Buffers, buffer views, and the URIs they come from.
+
+use super::Document;
+use crate::load::error::{LoadError, ReadError};
+use crate::load::source::{Bytes, Folder, SCENE_LIMIT};
+use gltf::json::{Index, Root, buffer::View};
+use std::borrow::Cow;
+
+/// Data of one buffer, or why it is not there (an error only for those who want to read it).
+pub(super) struct Buffer<'a> {
+    data: Result<Cow<'a, [u8]>, String>,
+}
+
+/// Gets all buffers.
+pub(super) fn read_all<'a>(root: &Root, folder: &Folder, binary: Option<&'a [u8]>) -> Vec<Buffer<'a>> {
+    let one = |(i, buffer): (usize, &gltf::json::Buffer)| {
+        let data = match (&buffer.uri, binary) {
+            (Some(uri), _) => read_uri(folder, uri, SCENE_LIMIT).map_err(|why| format!("{}: {why}", shorten(uri))),
+            (None, Some(binary)) if i == 0 => Ok(Cow::Borrowed(binary)),
+            (None, _) => Err("neither a URI nor a binary chunk holds its data".to_owned()),
+        };
+        let wanted = buffer.byte_length.0;
+        let checked = data.and_then(|data| {
+            if data.len() as u64 >= wanted {
+                Ok(data)
+            } else {
+                Err(format!("too short: byteLength is {wanted}, the data has {} bytes", data.len()))
+            }
+        });
+        Buffer { data: checked }
+    };
+    root.buffers.iter().enumerate().map(one).collect()
+}
+
+/// Reads a `data:` URI or a percent-encoded reference to a file of the scene's folder.
+pub(super) fn read_uri(folder: &Folder, uri: &str, limit: u64) -> Result<Bytes, ReadError> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        return decode_data(data).map(Cow::Owned);
+    }
+    let decoded = percent_decoded(uri);
+    let plain = String::from_utf8_lossy(&decoded);
+    match folder.read(&plain, limit) {
+        Err(ReadError::Missing) if plain != uri => folder.read(uri, limit),
+        done => done,
+    }
+}
+
+/// A URI short enough for a message.
+pub(super) fn shorten(uri: &str) -> String {
+    if uri.starts_with("data:") {
+        return "data URI".to_owned();
+    }
+    let decoded = percent_decoded(uri);
+    let text = String::from_utf8_lossy(&decoded);
+    if text.chars().count() > 120 { text.chars().take(120).chain("...".chars()).collect() } else { text.into_owned() }
+}
+
+impl<'a> Document<'a> {
+    /// The bytes of a buffer view and its stride.
+    pub(super) fn view(&self, index: &Index<View>, user: &str) -> Result<(&[u8], Option<usize>), LoadError> {
+        let view = self.at(&self.root.buffer_views, index, "buffer view", user)?;
+        let place = || format!("buffer view {}", index.value());
+        self.at(&self.root.buffers, &view.buffer, "buffer", &place())?;
+        let buffer = &self.buffers[view.buffer.value()];
+        let data = buffer.data.as_ref().map_err(|why| self.broken(format!("buffer {}", view.buffer.value()), why))?;
+        let offset = view.byte_offset.map_or(0, |offset| offset.0);
+        let range = offset.checked_add(view.byte_length.0).and_then(|end| {
+            let (start, end) = (usize::try_from(offset).ok()?, usize::try_from(end).ok()?);
+            data.get(start..end)
+        });
+        let bytes = range.ok_or_else(|| {
+            let length = view.byte_length.0;
+            let size = data.len();
+            self.broken(place(), format!("out of bounds: offset {offset} + length {length} in a buffer of {size} bytes"))
+        })?;
+        Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+    }
+}
+
+fn decode_data(data: &str) -> Result<Vec<u8>, ReadError> {
+    let (head, body) = data.split_once(',').ok_or(ReadError::Data("data URI without a comma"))?;
+    if head.split(';').any(|word| word.eq_ignore_ascii_case("base64")) {
+        decode_base64(body).ok_or(ReadError::Data("data URI is not valid base64"))
+    } else {
+        Ok(percent_decoded(body))
+    }
+}
+
+/// RFC 4648, either alphabet, with or without padding and line breaks.
+fn decode_base64(text: &str) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 3);
+    let (mut pending, mut bits) = (0_u32, 0_u32);
+    let digits = text.bytes().filter(|byte| !byte.is_ascii_whitespace());
+    let padding = text.trim_end().bytes().rev().take_while(|&byte| byte == b'=').count();
+    let count = digits.clone().count().checked_sub(padding)?;
+    if padding > 2 || count % 4 == 1 {
+        return None;
+    }
+    for digit in digits.take(count) {
+        let value = match digit {
+            b'A'..=b'Z' => digit - b'A',
+            b'a'..=b'z' => digit - b'a' + 26,
+            b'0'..=b'9' => digit - b'0' + 52,
+            b'+' | b'-' => 62,
+            b'/' | b'_' => 63,
+            _ => return None,
+        };
+        pending = pending << 6 | u32::from(value);
+        bits += 6;
+        if bits >= 8 {
+            bits -= 8;
+            bytes.push((pending >> bits & 0xff) as u8);
+        }
+    }
+    Some(bytes)
+}
+
+fn percent_decoded(text: &str) -> Vec<u8> {
+    let bytes = text.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let escape = (byte == b'%').then(|| text.get(at + 1..at + 3)).flatten();
+        match escape.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
+            Some(value) => {
+                decoded.push(value);
+                at += 3;
+            }
+            None => {
+                decoded.push(byte);
+                at += 1;
+            }
+        }
+    }
+    decoded
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_is_read_with_and_without_padding() {
+        assert_eq!(decode_base64("aGFsbG8=").as_deref(), Some(b"hallo".as_slice()));
+        assert_eq!(decode_base64("aGFs\nbG8").as_deref(), Some(b"hallo".as_slice()));
+        assert_eq!(decode_base64("aGFsbG8*"), None);
+        assert_eq!(decode_base64("a"), None);
+        assert_eq!(decode_base64("a="), None);
+    }
+
+    #[test]
+    fn percent_signs_are_decoded_only_where_hex_digits_follow() {
+        assert_eq!(percent_decoded("a%20b%zz%C3%A9%"), "a b%zzé%".as_bytes());
+    }
+}

@@ -1,0 +1,236 @@
+//! The node hierarchy: checked, then spawned from the roots down without recursion.
+
+use super::material::Palette;
+use super::mesh::{Built, Meshes};
+use super::{Document, Placement, light, skin};
+use crate::load::error::LoadError;
+use crate::load::report::Sink;
+use crate::scene::{Instance, Transform};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DMat4, DQuat, DVec3};
+use gltf::json::{self, Index};
+
+/// Most nodes and instances of one file together.
+const MOST_NODES: usize = 1 << 22;
+
+/// Spawns the default scene (else the first, else all root nodes) below `root`.
+pub(super) fn spawn_scene(
+    document: &Document<'_>,
+    root: Entity,
+    mut palette: Palette,
+    sink: &mut Sink<'_>,
+) -> Result<(), LoadError> {
+    let nodes = &document.root.nodes;
+    if nodes.len() > MOST_NODES {
+        return Err(document.broken("nodes", format!("{} nodes: the limit is {MOST_NODES}", nodes.len())));
+    }
+    let parents = check_hierarchy(document)?;
+    let roots = scene_roots(document, &parents, sink)?;
+    let local: Vec<DAffine3> =
+        (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
+    let order = top_down(document, &roots);
+    let mut world: Vec<Option<DAffine3>> = vec![None; nodes.len()];
+    for &i in &order {
+        let above = parents[i].and_then(|parent| world[parent]).unwrap_or(DAffine3::IDENTITY);
+        world[i] = Some(above * local[i]);
+    }
+    let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
+    let mut meshes = Meshes::default();
+    for &i in &order {
+        let node = &nodes[i];
+        let user = format!("node {i}");
+        let parent = parents[i].and_then(|parent| entities[parent]).unwrap_or(root);
+        let name = Name::new(node.name.clone().unwrap_or_else(|| user.clone()));
+        let entity = sink.spawn((name, Transform(local[i]), ChildOf(parent)));
+        entities[i] = Some(entity);
+        if let Some(light) = light::light_of(document, node, &user, sink)? {
+            sink.world.entity_mut(entity).insert(light);
+        }
+        if let Some((name, camera)) = light::camera_of(document, node, &user, sink)? {
+            sink.world.entity_mut(entity).insert(camera);
+            sink.report.cameras.push((name, entity));
+        }
+        if let Some(mesh) = &node.mesh {
+            let joints = match &node.skin {
+                Some(index) => Some((index.value(), skin::joints(document, index, &world, &user)?)),
+                None => None,
+            };
+            let posed = joints.as_ref().map(|(skin, joints)| (*skin, joints.as_slice()));
+            let built = meshes.get(document, mesh, posed, &mut palette, &user, sink)?;
+            if posed.is_some() {
+                // The format: the transform of a skinned mesh's own node does not count.
+                let name = Name::new(format!("{user} (skinned)"));
+                let holder = sink.spawn((name, Transform::default(), ChildOf(root)));
+                instantiate(&built, holder, sink);
+            } else {
+                place(document, node, entity, &built, &user, sink)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Puts the mesh on its node, or once at each place that `EXT_mesh_gpu_instancing` lists.
+fn place(
+    document: &Document<'_>,
+    node: &json::Node,
+    entity: Entity,
+    built: &Built,
+    user: &str,
+    sink: &mut Sink<'_>,
+) -> Result<(), LoadError> {
+    let others = node.extensions.as_ref().map(|extensions| &extensions.others);
+    let Some(lists) = others.and_then(|others| others.get("EXT_mesh_gpu_instancing")?.get("attributes")) else {
+        instantiate(built, entity, sink);
+        return Ok(());
+    };
+    let open = |name: &str, width: usize| {
+        let index = lists.get(name).and_then(serde_json::Value::as_u64).and_then(|i| u32::try_from(i).ok());
+        let Some(index) = index else { return Ok(None) };
+        let elements = document.elements(&Index::new(index), &format!("{user}, instances {name}"))?;
+        if elements.width == width { Ok(Some(elements)) } else { Err(document.broken(user, format!("instances: {name} of a wrong type"))) }
+    };
+    let (translation, rotation, scale) = (open("TRANSLATION", 3)?, open("ROTATION", 4)?, open("SCALE", 3)?);
+    let counts = || [&translation, &rotation, &scale].into_iter().flatten().map(|elements| elements.count);
+    let count = counts().max().unwrap_or(0);
+    if counts().any(|other| other != count) || sink.spawned().len() + count > MOST_NODES {
+        return Err(document.broken(user, "instances: lists of unequal or too large count"));
+    }
+    for i in 0..count {
+        let parts = Placement {
+            matrix: None,
+            translation: translation.as_ref().map(|elements| elements.get(i)),
+            rotation: rotation.as_ref().map(|elements| elements.get(i)),
+            scale: scale.as_ref().map(|elements| elements.get(i)),
+        };
+        let name = Name::new(format!("instance {i}"));
+        let copy = sink.spawn((name, Transform(parts.affine().0), ChildOf(entity)));
+        instantiate(built, copy, sink);
+    }
+    Ok(())
+}
+
+fn instantiate(built: &Built, entity: Entity, sink: &mut Sink<'_>) {
+    sink.report.triangles += built.triangles;
+    if let Some(mesh) = built.entity {
+        sink.world.entity_mut(entity).insert(Instance { mesh, materials: built.materials.clone() });
+    }
+}
+
+impl Placement {
+    /// `parent_from_node`, and whether it had to be mended.
+    fn affine(&self) -> (DAffine3, bool) {
+        if let Some(matrix) = self.matrix {
+            let matrix = DMat4::from_cols_array(&matrix);
+            let is_affine = matrix.row(3) == glam::DVec4::W;
+            return (DAffine3::from_mat4(matrix), !is_affine);
+        }
+        let [x, y, z, w] = self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let stored = DQuat::from_xyzw(x, y, z, w);
+        let length = stored.length();
+        let rotation = if length > 0.0 && length.is_finite() { stored / length } else { DQuat::IDENTITY };
+        let translation = self.translation.map_or(DVec3::ZERO, DVec3::from);
+        let scale = self.scale.map_or(DVec3::ONE, DVec3::from);
+        let affine = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
+        (affine, (length - 1.0).abs() > 1e-2 || !length.is_finite())
+    }
+}
+
+fn placement(document: &Document<'_>, i: usize, sink: &mut Sink<'_>) -> Result<DAffine3, LoadError> {
+    let Some(placement) = document.placements.get(i) else {
+        return Ok(DAffine3::IDENTITY);
+    };
+    let (affine, mended) = placement.affine();
+    if !affine.is_finite() {
+        return Err(document.broken(format!("node {i}"), "its transform is not finite"));
+    }
+    if mended {
+        let what = if placement.matrix.is_some() { "matrix is not affine: its last row is ignored" } else { "rotation is not a unit quaternion: normalised" };
+        sink.warn(format!("{}: node {i}: {what}", document.file));
+    }
+    Ok(affine)
+}
+
+/// Parent of each node; refuses children that do not exist, second parents and cycles.
+fn check_hierarchy(document: &Document<'_>) -> Result<Vec<Option<usize>>, LoadError> {
+    let nodes = &document.root.nodes;
+    let mut parents = vec![None; nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        for child in node.children.iter().flatten() {
+            document.at(nodes, child, "child node", &format!("node {i}"))?;
+            if let Some(first) = parents[child.value()].replace(i) {
+                let problem = format!("has two parents, node {first} and node {i}: the hierarchy is not a tree");
+                return Err(document.broken(format!("node {}", child.value()), problem));
+            }
+        }
+    }
+    // With one parent each, whoever never reaches a root walks in a cycle.
+    let mut reaches_root = vec![false; nodes.len()];
+    let mut path = Vec::new();
+    for start in 0..nodes.len() {
+        let mut here = Some(start);
+        while let Some(i) = here.filter(|&i| !reaches_root[i]) {
+            path.push(i);
+            if path.len() > nodes.len() {
+                return Err(document.broken(format!("node {start}"), "is its own ancestor: a cycle in the node hierarchy"));
+            }
+            here = parents[i];
+        }
+        for i in path.drain(..) {
+            reaches_root[i] = true;
+        }
+    }
+    Ok(parents)
+}
+
+/// Nodes at the top of what is shown.
+fn scene_roots(document: &Document<'_>, parents: &[Option<usize>], sink: &mut Sink<'_>) -> Result<Vec<usize>, LoadError> {
+    let root = &document.root;
+    let file = document.file;
+    let scene = match &root.scene {
+        Some(index) => Some(document.at(&root.scenes, index, "scene", "default scene")?),
+        None => root.scenes.first(),
+    };
+    if root.scenes.len() > 1 {
+        let shown = root.scene.as_ref().map_or(0, Index::value);
+        sink.decide(format!("{file}: has {} scenes; shows scene {shown}", root.scenes.len()));
+    }
+    let Some(scene) = scene else {
+        if !parents.is_empty() {
+            sink.decide(format!("{file}: no scene in it; shows all nodes"));
+        }
+        return Ok((0..parents.len()).filter(|&i| parents[i].is_none()).collect());
+    };
+    let mut listed = vec![false; parents.len()];
+    for node in &scene.nodes {
+        document.at(&root.nodes, node, "node", "scene")?;
+        listed[node.value()] = true;
+    }
+    // Below a listed node: found from the tops down, so that no chain is walked twice.
+    let tops: Vec<usize> = (0..parents.len()).filter(|&i| parents[i].is_none()).collect();
+    let mut shown_above = vec![false; parents.len()];
+    for i in top_down(document, &tops) {
+        shown_above[i] = parents[i].is_some_and(|parent| listed[parent] || shown_above[parent]);
+    }
+    let mut roots = Vec::new();
+    for node in scene.nodes.iter().map(Index::value) {
+        if shown_above[node] || !std::mem::take(&mut listed[node]) {
+            sink.warn(format!("{file}: scene: node {node} is listed although it is shown already"));
+        } else {
+            roots.push(node);
+        }
+    }
+    Ok(roots)
+}
+
+/// All nodes below the roots, parents before children, in file order.
+fn top_down(document: &Document<'_>, roots: &[usize]) -> Vec<usize> {
+    let mut stack: Vec<usize> = roots.iter().rev().copied().collect();
+    let mut order = Vec::new();
+    while let Some(i) = stack.pop() {
+        order.push(i);
+        stack.extend(document.root.nodes[i].children.iter().flatten().rev().map(Index::value));
+    }
+    order
+}

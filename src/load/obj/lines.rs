@@ -1,0 +1,78 @@
+//! Statements of OBJ and MTL files: line ends of all systems, joined by `\`, without comments.
+
+use super::super::error::LoadError;
+use super::super::source::without_bom;
+use std::borrow::Cow;
+
+/// The text of a file, without byte order mark. Bytes that are not UTF-8 become replacement characters.
+pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, LoadError> {
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err(LoadError::broken(file, "encoding", "UTF-16 text; save it as UTF-8"));
+    }
+    if bytes.contains(&0) {
+        return Err(LoadError::broken(file, "content", "binary data, not text in UTF-8"));
+    }
+    Ok(String::from_utf8_lossy(without_bom(bytes)))
+}
+
+/// One statement.
+pub(super) struct Statement<'a> {
+    /// Of its first line, from 1.
+    pub(super) line: u32,
+    pub(super) keyword: &'a str,
+    /// Without surrounding white space.
+    pub(super) rest: &'a str,
+}
+
+/// Calls `visit` for each statement of `text`.
+pub(super) fn for_each<E>(text: &str, mut visit: impl FnMut(Statement<'_>) -> Result<(), E>) -> Result<(), E> {
+    let mut line = 0_u32;
+    let mut joined: Option<(u32, String)> = None;
+    let mut rest = text;
+    while !rest.is_empty() {
+        let end = rest.bytes().position(|byte| byte == b'\n' || byte == b'\r').unwrap_or(rest.len());
+        let here = &rest[..end];
+        rest = &rest[end..];
+        rest = rest.strip_prefix("\r\n").unwrap_or_else(|| rest.get(1..).unwrap_or_default());
+        line = line.saturating_add(1);
+        if let Some(part) = here.strip_suffix('\\')
+            && !rest.is_empty()
+        {
+            let (_, whole) = joined.get_or_insert_with(|| (line, String::new()));
+            whole.push_str(part);
+            whole.push(' ');
+        } else if let Some((first, mut whole)) = joined.take() {
+            whole.push_str(here);
+            one(first, &whole, &mut visit)?;
+        } else {
+            one(line, here, &mut visit)?;
+        }
+    }
+    Ok(())
+}
+
+fn one<E>(line: u32, text: &str, visit: &mut impl FnMut(Statement<'_>) -> Result<(), E>) -> Result<(), E> {
+    let text = text.trim();
+    if text.is_empty() || text.starts_with('#') {
+        return Ok(());
+    }
+    let (keyword, rest) = text.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((text, ""));
+    visit(Statement { line, keyword, rest: rest.trim_start() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_line_ends_and_continuations_are_understood() {
+        let mut seen = Vec::new();
+        let text = "# a\r\nv 1 2\\\n 3\rf  1 2\n\n\tusemtl  red paint \n";
+        let done: Result<(), ()> = for_each(text, |s| {
+            seen.push(format!("{}:{}={}", s.line, s.keyword, s.rest));
+            Ok(())
+        });
+        assert_eq!(done, Ok(()));
+        assert_eq!(seen, ["2:v=1 2  3", "4:f=1 2", "6:usemtl=red paint"]);
+    }
+}

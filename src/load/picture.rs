@@ -1,0 +1,161 @@
+//! Image files → texels. A picture that cannot be had is a warning and a magenta checker, never an error.
+
+use super::error::ReadError;
+use super::report::Sink;
+use crate::scene::Texels;
+use image::error::ImageError;
+use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::io::Cursor;
+use std::sync::Arc;
+
+/// Most texels of one picture: 8192 squared, 256 MiB decoded.
+const MOST_TEXELS: u64 = 1 << 26;
+/// Most texels of all pictures of a file together: 2 GiB decoded.
+const MOST_TEXELS_TOGETHER: u64 = 1 << 29;
+
+/// A picture to decode.
+pub(super) struct Picture<'a> {
+    /// How messages name it, e.g. `image 3 (wood.png)`.
+    pub(super) label: String,
+    /// The bytes of the file.
+    pub(super) bytes: Result<Cow<'a, [u8]>, ReadError>,
+    /// Formats beyond PNG and JPEG deserve a warning (glTF allows no others).
+    pub(super) strict: bool,
+}
+
+/// Decodes all pictures side by side; `file` is the scene that names them.
+pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Arc<Texels>> {
+    let mut budget = MOST_TEXELS_TOGETHER;
+    let affordable: Vec<bool> = pictures
+        .iter()
+        .map(|picture| {
+            let texels = picture.bytes.as_ref().ok().and_then(|bytes| texel_count(bytes)).unwrap_or(0);
+            let fits = texels <= budget;
+            budget -= if fits { texels } else { 0 };
+            fits
+        })
+        .collect();
+    let decoded: Vec<(Arc<Texels>, Vec<String>)> = pictures
+        .par_iter()
+        .zip(affordable)
+        .map(|(picture, affordable)| {
+            let mut remarks = Vec::new();
+            let result = match &picture.bytes {
+                Err(why) => Err(format!("image {why}")),
+                Ok(_) if !affordable => Err("image left out: the pictures together are too large".to_owned()),
+                Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
+            };
+            let texels = result.unwrap_or_else(|why| {
+                remarks.push(format!("{why}; a magenta checker stands in"));
+                stand_in()
+            });
+            (Arc::new(texels), remarks)
+        })
+        .collect();
+    decoded
+        .into_iter()
+        .zip(pictures)
+        .map(|((texels, remarks), picture)| {
+            for remark in remarks {
+                sink.warn(format!("{file}: {}: {remark}", picture.label));
+            }
+            texels
+        })
+        .collect()
+}
+
+/// Magenta and black: what is missing should be seen.
+pub(super) fn stand_in() -> Texels {
+    let (magenta, black) = ([255, 0, 255, 255], [0, 0, 0, 255]);
+    let texels = (0..64).map(|i| if (i % 8 + i / 8) % 2 == 0 { magenta } else { black }).collect();
+    Texels { width: 8, height: 8, texels }
+}
+
+fn texel_count(bytes: &[u8]) -> Option<u64> {
+    let (width, height) = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?.into_dimensions().ok()?;
+    Some(u64::from(width) * u64::from(height))
+}
+
+/// Decodes one picture, by its first bytes and not by its name.
+fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texels, String> {
+    if let Some(format) = foreign_format(bytes) {
+        return Err(format!("image format {format} is not supported"));
+    }
+    let reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| format!("image cannot be read: {error}"))?;
+    let Some(format) = reader.format() else {
+        return Err("image format not recognised".to_owned());
+    };
+    if strict && !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP) {
+        remarks.push(format!("image format {format:?} is not allowed in glTF; used all the same"));
+    }
+    if format == ImageFormat::Jpeg && !has_jpeg_end(bytes) {
+        remarks.push("JPEG image is truncated; the missing part is grey".to_owned());
+    }
+    let mut decoder = reader.into_decoder().map_err(|error| describe(&error))?;
+    let (width, height) = decoder.dimensions();
+    let texels = u64::from(width) * u64::from(height);
+    if texels == 0 {
+        return Err("image is empty (0 texels)".to_owned());
+    }
+    if texels > MOST_TEXELS {
+        return Err(format!("image of {width} x {height} is too large (limit {MOST_TEXELS} texels)"));
+    }
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(16 * MOST_TEXELS);
+    decoder.set_limits(limits).map_err(|error| describe(&error))?;
+    if format == ImageFormat::Jpeg && jpeg_components(bytes) == Some(4) {
+        remarks.push("CMYK JPEG image: its colours are approximate".to_owned());
+    }
+    if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+        remarks.push("image with high dynamic range: cut at 1 and kept in 8 bits".to_owned());
+    }
+    let rgba = image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
+    let (width, height) = rgba.dimensions();
+    let (texels, rest) = rgba.as_raw().as_chunks::<4>();
+    if rest.is_empty() && texels.len() as u64 == u64::from(width) * u64::from(height) {
+        Ok(Texels { width, height, texels: texels.to_vec() })
+    } else {
+        Err("image has the wrong number of texels".to_owned())
+    }
+}
+
+fn describe(error: &ImageError) -> String {
+    let reason = error.to_string().replace('\n', " ");
+    format!("image cannot be decoded ({reason})")
+}
+
+/// Formats that scenes refer to and that are not decoded.
+fn foreign_format(bytes: &[u8]) -> Option<&'static str> {
+    const MAGIC: [(&[u8], &str); 4] = [
+        (b"\xabKTX 20\xbb", "KTX2 (KHR_texture_basisu)"),
+        (b"\xabKTX 11\xbb", "KTX"),
+        (b"DDS ", "DDS"),
+        (b"sB", "Basis Universal"),
+    ];
+    MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, name)| name)
+}
+
+/// Whether the end-of-image marker is there.
+fn has_jpeg_end(bytes: &[u8]) -> bool {
+    bytes.windows(2).rev().take(1 << 16).any(|pair| pair == [0xff, 0xd9])
+}
+
+/// Colour components according to the frame header.
+fn jpeg_components(bytes: &[u8]) -> Option<u8> {
+    let mut at = 2;
+    loop {
+        let header = bytes.get(at..at + 4)?;
+        let [0xff, marker, high, low] = *header else {
+            return None;
+        };
+        let is_frame = (0xc0..=0xcf).contains(&marker) && ![0xc4, 0xc8, 0xcc].contains(&marker);
+        if is_frame {
+            return bytes.get(at + 9).copied();
+        }
+        at += 2 + usize::from(u16::from_be_bytes([high, low]));
+    }
+}

@@ -1,0 +1,163 @@
+//! Every byte that a scene is made of comes through here: from disk, or from the program itself.
+
+use super::builtin;
+use super::error::ReadError;
+use std::borrow::Cow;
+use std::fs;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+/// Most bytes of a scene file or buffer.
+pub(super) const SCENE_LIMIT: u64 = 8 << 30;
+/// Most bytes of an image file.
+pub(super) const IMAGE_LIMIT: u64 = 512 << 20;
+/// Most bytes of a material library or settings file.
+pub(super) const TEXT_LIMIT: u64 = 64 << 20;
+
+/// File contents: read from disk, or part of the program.
+pub(super) type Bytes = Cow<'static, [u8]>;
+
+/// Where the files that a scene file names are looked for.
+#[derive(Clone, Debug)]
+pub(super) enum Folder {
+    /// On disk.
+    Disk(PathBuf),
+    /// Among the assets compiled into the program.
+    BuiltIn,
+}
+
+impl Folder {
+    /// The folder that `path` lies in.
+    pub(super) fn of(path: &Path) -> Self {
+        match path.parent() {
+            Some(parent) if parent != Path::new("") => Self::Disk(parent.to_path_buf()),
+            _ => Self::Disk(PathBuf::from(".")),
+        }
+    }
+
+    /// Reads what a downloaded scene names: inside this folder only. `\` counts as `/`, and a name
+    /// that differs only in case is found too.
+    pub(super) fn read(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
+        if let Some(scheme) = uri_scheme(reference) {
+            return Err(ReadError::Scheme(scheme.to_owned()));
+        }
+        let reference = reference.replace('\\', "/");
+        let relative = inside(&reference).ok_or(ReadError::Outside)?;
+        match self {
+            Self::Disk(folder) => {
+                let exact = folder.join(&relative);
+                if exact.exists() { read_file(&exact, limit) } else { read_file(&any_case(folder, &relative)?, limit) }
+            }
+            Self::BuiltIn => {
+                builtin::asset(&relative.to_string_lossy()).map(Cow::Borrowed).ok_or(ReadError::Missing)
+            }
+        }
+    }
+
+    /// As [`Folder::read`]; a path that is absolute, elsewhere or missing is tried once more by its
+    /// bare file name, because exporters write the paths of the machine they ran on.
+    pub(super) fn read_or_neighbour(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
+        let first = match self.read(reference, limit) {
+            Err(why @ (ReadError::Missing | ReadError::Outside | ReadError::Scheme(_))) => why,
+            done => return done,
+        };
+        match reference.rsplit(['/', '\\']).next() {
+            Some(bare) if bare != reference => self.read(bare, limit).map_err(|_| first),
+            _ => Err(first),
+        }
+    }
+}
+
+/// Reads a whole regular file of at most `limit` bytes.
+pub(super) fn read_file(path: &Path, limit: u64) -> Result<Bytes, ReadError> {
+    let metadata = fs::metadata(path).map_err(from_io)?;
+    if !metadata.is_file() {
+        return Err(ReadError::NotAFile);
+    }
+    let length = metadata.len();
+    if length > limit {
+        return Err(ReadError::TooLarge { length, limit });
+    }
+    let mut bytes = Vec::new();
+    let capacity = usize::try_from(length).unwrap_or(usize::MAX);
+    bytes.try_reserve_exact(capacity).map_err(|_| std::io::Error::from(std::io::ErrorKind::OutOfMemory))?;
+    fs::File::open(path).map_err(from_io)?.take(limit).read_to_end(&mut bytes)?;
+    Ok(Cow::Owned(bytes))
+}
+
+fn from_io(error: std::io::Error) -> ReadError {
+    if error.kind() == std::io::ErrorKind::NotFound { ReadError::Missing } else { ReadError::Io(error) }
+}
+
+/// `http` of `http://...`; a single letter is a Windows drive, not a scheme.
+pub(super) fn uri_scheme(reference: &str) -> Option<&str> {
+    let (scheme, _) = reference.split_once(':')?;
+    let legal = scheme.len() >= 2
+        && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    legal.then_some(scheme)
+}
+
+/// The relative path without `.` and `..`, if it stays below its start.
+fn inside(reference: &str) -> Option<PathBuf> {
+    let drive = reference.as_bytes().get(1) == Some(&b':');
+    if drive || reference.contains('\0') {
+        return None;
+    }
+    let mut clean = PathBuf::new();
+    for component in Path::new(reference).components() {
+        match component {
+            Component::Normal(name) => clean.push(name),
+            Component::CurDir => {}
+            Component::ParentDir if clean.pop() => {}
+            Component::ParentDir | Component::RootDir | Component::Prefix(_) => return None,
+        }
+    }
+    (clean != Path::new("")).then_some(clean)
+}
+
+/// Finds `relative` below `folder` whatever the case of its letters.
+fn any_case(folder: &Path, relative: &Path) -> Result<PathBuf, ReadError> {
+    let mut found = folder.to_path_buf();
+    for component in relative.components() {
+        let exact = found.join(component);
+        if exact.exists() {
+            found = exact;
+            continue;
+        }
+        let wanted = component.as_os_str().to_string_lossy().to_lowercase();
+        found = fs::read_dir(&found)
+            .map_err(from_io)?
+            .filter_map(Result::ok)
+            .find(|entry| entry.file_name().to_string_lossy().to_lowercase() == wanted)
+            .ok_or(ReadError::Missing)?
+            .path();
+    }
+    Ok(found)
+}
+
+/// Text without a byte order mark.
+pub(super) fn without_bom(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_must_stay_inside_the_folder() {
+        assert_eq!(inside("a/../b.png"), Some(PathBuf::from("b.png")));
+        assert_eq!(inside("./x y.bin"), Some(PathBuf::from("x y.bin")));
+        for outside in ["../a", "/etc/passwd", "a/../../b", "C:/a", "", "."] {
+            assert_eq!(inside(outside), None, "{outside}");
+        }
+    }
+
+    #[test]
+    fn a_drive_letter_is_not_a_scheme() {
+        assert_eq!(uri_scheme("http://x/y"), Some("http"));
+        assert_eq!(uri_scheme("C:\\x"), None);
+        assert_eq!(uri_scheme("a b.png"), None);
+    }
+}

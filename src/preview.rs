@@ -1,0 +1,99 @@
+//! A coarse whole picture, first of all, whenever the view has changed.
+
+use crate::trace::{Film, RayCounts, TraceScene, trace_pass};
+use bevy_ecs::prelude::*;
+use std::time::{Duration, Instant};
+
+/// The coarse picture, and how coarse it has to be.
+#[derive(Resource, Debug)]
+pub struct Preview {
+    film: Option<Film>,
+    scale: u32,
+    seconds_per_pixel: Option<f64>,
+}
+
+/// Time that a preview may take.
+const TARGET: Duration = Duration::from_millis(20);
+/// A finer step is taken only if it is expected to need less than this part of [`TARGET`]: without the
+/// gap two steps would alternate.
+const HEADROOM: f64 = 0.7;
+/// Pixels of the picture along a pixel of the preview.
+const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
+
+impl Default for Preview {
+    fn default() -> Self {
+        Self { film: None, scale: 8, seconds_per_pixel: None }
+    }
+}
+
+impl Preview {
+    /// Traces the whole picture once at the coarseness that fits the time, to the end, and returns its
+    /// rays. At scale 1 it leaves that to the film itself and returns `None`.
+    pub fn trace(&mut self, scene: &TraceScene) -> Option<RayCounts> {
+        self.choose_scale(f64::from(scene.settings.size.element_product()));
+        if self.scale == 1 {
+            self.film = None;
+            return None;
+        }
+        let size = (scene.settings.size / self.scale).max(glam::UVec2::ONE);
+        let film = match &mut self.film {
+            Some(film) if film.size() == size => film,
+            other => other.insert(Film::new(size, 0)),
+        };
+        film.reset();
+        let start = Instant::now();
+        let rays = trace_pass(scene, film, 1, 1, || true);
+        self.note(start.elapsed(), f64::from(size.element_product()));
+        Some(rays)
+    }
+
+    /// Learns what `pixels` pixels cost.
+    pub fn note(&mut self, time: Duration, pixels: f64) {
+        let measured = time.as_secs_f64() / pixels;
+        // Half the old value: one hiccup of the machine does not coarsen the picture by much.
+        self.seconds_per_pixel = Some(self.seconds_per_pixel.map_or(measured, |old| 0.5 * (old + measured)));
+    }
+
+    /// The coarse film, if the last preview needed one.
+    #[must_use]
+    pub fn film(&self) -> Option<&Film> {
+        self.film.as_ref()
+    }
+
+    /// Side of a preview pixel in pixels of the picture.
+    #[must_use]
+    pub fn scale(&self) -> u32 {
+        self.scale
+    }
+
+    fn choose_scale(&mut self, pixels: f64) {
+        let Some(seconds_per_pixel) = self.seconds_per_pixel else { return };
+        let cost = |scale: u32| seconds_per_pixel * pixels / f64::from(scale * scale) / TARGET.as_secs_f64();
+        let fits = |limit: f64| SCALES.into_iter().find(|&s| cost(s) <= limit).unwrap_or(16);
+        if cost(self.scale) > 1.0 {
+            self.scale = fits(1.0);
+        } else {
+            self.scale = fits(HEADROOM).min(self.scale);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(scale: u32, ms_at_full: f64) -> u32 {
+        let mut preview = Preview { film: None, scale, seconds_per_pixel: Some(ms_at_full * 1e-3) };
+        preview.choose_scale(1.0);
+        preview.scale
+    }
+
+    #[test]
+    fn scale_follows_the_measured_time_with_hysteresis() {
+        assert_eq!(at(8, 10.0), 1, "cheap pictures need no preview");
+        assert_eq!(at(1, 100.0), 3, "100 ms at full size is 11 ms at a third");
+        assert_eq!(at(3, 70.0), 3, "17.5 ms at half size would fit, but not with headroom");
+        assert_eq!(at(2, 70.0), 2, "and so it stays from below");
+        assert_eq!(at(2, 1e9), 16, "never coarser than 16");
+    }
+}

@@ -1,0 +1,63 @@
+//! Pixels → rays.
+
+use crate::bvh::Ray;
+use crate::scene::Projection;
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DMat3, DVec3, UVec2, Vec2, Vec3};
+
+/// The camera as rays need it, in render space.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub struct Viewpoint {
+    origin: Vec3,
+    /// Unit and orthogonal: picture right, picture up, and backward.
+    right: Vec3,
+    up: Vec3,
+    back: Vec3,
+    projection: Projection,
+}
+
+impl Default for Viewpoint {
+    fn default() -> Self {
+        let projection = Projection::Perspective { vertical_fov: std::f32::consts::FRAC_PI_4 };
+        Self::new(&DAffine3::IDENTITY, projection)
+    }
+}
+
+impl Viewpoint {
+    /// A camera at this pose, looking along −Z. Scale and shear of the pose are ignored.
+    #[must_use]
+    pub fn new(render_from_camera: &DAffine3, projection: Projection) -> Self {
+        let DMat3 { x_axis, y_axis, z_axis } = render_from_camera.matrix3;
+        let back = z_axis.try_normalize().unwrap_or(DVec3::Z);
+        let up = (y_axis - back * back.dot(y_axis)).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+        // A mirrored pose mirrors the picture.
+        let right = up.cross(back) * if up.cross(back).dot(x_axis) < 0.0 { -1.0 } else { 1.0 };
+        Self {
+            origin: render_from_camera.translation.as_vec3(),
+            right: right.as_vec3(),
+            up: up.as_vec3(),
+            back: back.as_vec3(),
+            projection,
+        }
+    }
+
+    /// The ray through `point`, in pixels from the top left of a picture of `size`; unit direction.
+    #[must_use]
+    pub fn ray(&self, point: Vec2, size: UVec2) -> Ray {
+        let size = size.as_vec2();
+        // In units of half the picture's height, up positive.
+        let x = (2.0 * point.x - size.x) / size.y;
+        let y = 1.0 - 2.0 * point.y / size.y;
+        match self.projection {
+            Projection::Perspective { vertical_fov } => {
+                let k = (0.5 * vertical_fov).tan();
+                let direction = (self.right * (x * k) + self.up * (y * k) - self.back).normalize();
+                Ray::new(self.origin, direction)
+            }
+            Projection::Orthographic { height } => {
+                let offset = (self.right * x + self.up * y) * (0.5 * height);
+                Ray::new(self.origin + offset, -self.back)
+            }
+        }
+    }
+}

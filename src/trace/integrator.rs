@@ -1,0 +1,298 @@
+//! Follows light back from the eye: all paths of a batch together, one bounce at a time.
+//!
+//! Each wave is four steps over whole batches: trace, shade (which queues shadow rays), trace the
+//! shadows, keep the paths that go on. The result for a sample is a function of its
+//! [`Sampler`] alone, so it does not matter who shares the batch.
+
+use super::bsdf::{Bsdf, Lobes};
+use super::film::Tile;
+use super::light::{FlatLight, LightSample};
+use super::pass::RayCounts;
+use super::sampler::Sampler;
+use super::scene::Surface;
+use super::surface::Interaction;
+use super::{Integrator, TraceScene};
+use crate::bvh::{Hit, Ray};
+use glam::{UVec2, Vec3};
+
+/// One path under way.
+#[derive(Clone, Copy, Debug)]
+struct Path {
+    /// Which entry of the batch it adds to.
+    entry: u32,
+    sampler: Sampler,
+    ray: Ray,
+    /// What light at the ray's end is worth at the eye.
+    throughput: Vec3,
+    depth: u32,
+    /// How the last bounce chose the ray's direction; `None`: no light sample could have found it.
+    bounce: Option<Bounce>,
+    /// Only collects what shines at its end.
+    last: bool,
+}
+
+/// The smooth bounce that a ray comes from.
+#[derive(Clone, Copy, Debug)]
+struct Bounce {
+    pdf: f32,
+    normal: Vec3,
+}
+
+/// A ray toward a light, and what it brings if nothing is in the way.
+#[derive(Clone, Copy, Debug)]
+struct Shadow {
+    entry: u32,
+    sampler: Sampler,
+    ray: Ray,
+    light: u32,
+    triangle: Option<(u32, u32)>,
+    contribution: Vec3,
+    key: u32,
+}
+
+/// Buffers of one thread, kept between batches.
+#[derive(Debug, Default)]
+pub struct Batch {
+    paths: Vec<Path>,
+    next: Vec<Path>,
+    shadows: Vec<Shadow>,
+    radiance: Vec<Vec3>,
+    keys: Vec<(u32, u32)>,
+}
+
+/// Dimensions of the sampler: pair 0 is the place in the pixel, then this many pairs a bounce.
+const PAIRS_PER_BOUNCE: u32 = 32;
+const LOBE: u32 = 1;
+const DIRECTION: u32 = 2;
+const PICK: u32 = 3;
+const LIGHT: u32 = 4;
+/// From this depth on a path may end by chance.
+const ROULETTE_DEPTH: u32 = 4;
+
+impl Batch {
+    /// Adds samples `first..first + count` to each pixel of `tile`, for a picture of `size`.
+    pub fn render(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2, count: u32, rays: &mut RayCounts) {
+        let first = tile.next_sample;
+        self.paths.clear();
+        self.keys.clear();
+        for sample in first..first + count {
+            for i in 0..tile.size.element_product() {
+                let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
+                let sampler = Sampler::new(pixel, sample, scene.settings.seed);
+                let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), size);
+                let entry = self.keys.len() as u32;
+                self.keys.push((i, sample));
+                let throughput = Vec3::ONE;
+                self.paths.push(Path { entry, sampler, ray, throughput, depth: 0, bounce: None, last: false });
+            }
+        }
+        self.radiance.clear();
+        self.radiance.resize(self.keys.len(), Vec3::ZERO);
+        rays.camera += self.paths.len() as u64;
+        while !self.paths.is_empty() {
+            self.wave(scene, rays);
+        }
+        let mut dropped = 0;
+        let pixels = tile.pixels_mut();
+        for (&(pixel, sample), &radiance) in self.keys.iter().zip(&self.radiance) {
+            dropped += u64::from(!pixels[pixel as usize].add(sample, radiance));
+        }
+        tile.dropped += dropped;
+        tile.next_sample += count;
+    }
+
+    fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
+        self.next.clear();
+        self.shadows.clear();
+        for i in 0..self.paths.len() {
+            let path = self.paths[i];
+            let hit = scene.closest_hit(&path.ray, |key| path.sampler.hashed(key ^ path.depth));
+            self.arrive(scene, &path, hit);
+        }
+        rays.shadow += self.shadows.len() as u64;
+        for shadow in &self.shadows {
+            let random = |key| shadow.sampler.hashed(key ^ shadow.key);
+            let blocked = scene.lights.blocks(&shadow.ray, shadow.light)
+                || scene.any_hit(&shadow.ray, shadow.triangle, random);
+            if !blocked {
+                self.radiance[shadow.entry as usize] += shadow.contribution;
+            }
+        }
+        rays.bounce += self.next.len() as u64;
+        std::mem::swap(&mut self.paths, &mut self.next);
+    }
+
+    /// What the end of a path's ray sends back along it, and where it goes on.
+    fn arrive(&mut self, scene: &TraceScene, path: &Path, hit: Option<Hit>) {
+        let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
+        if let Some(found) = scene.lights.closest(&before_hit) {
+            let (radiance, pdf) = found.shape.emitted(&path.ray, &found.hit);
+            self.collect(scene, path, found.light, radiance, pdf);
+            return;
+        }
+        let Some(hit) = hit else {
+            let normal = path.bounce.map_or(Vec3::Z, |b| b.normal);
+            for (light, beyond) in scene.lights.beyond() {
+                if let Some((radiance, pdf)) = beyond.beyond(normal, path.ray.direction) {
+                    self.collect(scene, path, light, radiance, pdf);
+                }
+            }
+            return;
+        };
+        let (instance, surface) = scene.surface_at(&hit);
+        let at = Interaction::new(scene, instance, &hit, &path.ray);
+        if surface.material.unlit {
+            let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
+            let shown = surface.material.base_color * texel.truncate();
+            self.radiance[path.entry as usize] += path.throughput * shown;
+            return;
+        }
+        let emission = at.emission(scene, surface);
+        if emission != Vec3::ZERO {
+            let slot = instance.mesh.slot(hit.triangle as usize) as u16;
+            match scene.lights.of_mesh(hit.instance, slot) {
+                Some(light) => {
+                    let distance2 = (at.position - path.ray.origin).length_squared();
+                    let cos = at.geometric_normal.dot(path.ray.direction).abs();
+                    let pdf = match scene.lights.get(light) {
+                        FlatLight::Mesh(mesh) => mesh.pdf(hit.triangle, distance2, cos),
+                        _ => 0.0,
+                    };
+                    self.collect(scene, path, light, emission, pdf);
+                }
+                None => self.radiance[path.entry as usize] += path.throughput * emission,
+            }
+        }
+        if !path.last {
+            self.scatter(scene, path, surface, &at);
+        }
+    }
+
+    /// Adds light that a ray ran into, weighted against the chance of having sampled it.
+    fn collect(&mut self, scene: &TraceScene, path: &Path, light: u32, radiance: Vec3, pdf: f32) {
+        let weight = path.bounce.map_or(1.0, |bounce| {
+            let light_pdf = pdf * scene.lights.chance(path.depth - 1, light);
+            power_heuristic(bounce.pdf, light_pdf)
+        });
+        self.radiance[path.entry as usize] += path.throughput * radiance * weight;
+    }
+
+    /// Queues shadow rays to lights, and the ray that goes on.
+    fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
+        let bsdf = at.bsdf(scene, surface);
+        let wo = -path.ray.direction;
+        let base = 1 + path.depth * PAIRS_PER_BOUNCE;
+        // Direct lighting finds Lambert's share by light samples alone: no ray is spent on it.
+        let followed = match scene.settings.integrator {
+            Integrator::Direct => Lobes::SPECULAR,
+            Integrator::Path => Lobes::ALL,
+        };
+        if bsdf.has_smooth_lobes() && !scene.lights.is_empty() {
+            for index in 0..scene.lights.picks(path.depth) {
+                let pair = index as u32 * 2;
+                let random = path.sampler.pair(base + PICK).x;
+                let pick = scene.lights.pick(path.depth, index, random);
+                let u = path.sampler.pair(base + LIGHT + pair);
+                if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {
+                    self.connect(scene, path, at, &bsdf, followed, pick.light, pick.chance, &sample);
+                }
+            }
+        }
+        let exhausted = path.depth >= scene.settings.max_depth;
+        // The last bounce may still run into a light by itself, if that is one of the two ways to sample it.
+        let lobes = if exhausted { Lobes { delta: false, ..followed } } else { followed };
+        if !bsdf.has(lobes) {
+            return;
+        }
+        let choice = path.sampler.pair(base + LOBE);
+        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), lobes) else { return };
+        let mut throughput = path.throughput * sample.weight;
+        if path.depth >= ROULETTE_DEPTH && !exhausted {
+            let survival = throughput.max_element().clamp(0.05, 1.0);
+            if choice.y >= survival {
+                return;
+            }
+            throughput /= survival;
+        }
+        let smooth = sample.pdf.is_some();
+        self.next.push(Path {
+            entry: path.entry,
+            sampler: path.sampler,
+            ray: Ray::new(at.origin_toward(sample.wi), sample.wi),
+            throughput,
+            depth: path.depth + 1,
+            bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal() }),
+            last: exhausted || smooth && scene.settings.integrator == Integrator::Direct,
+        });
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "all of one vertex; a struct for one call would only rename them")]
+    fn connect(
+        &mut self,
+        scene: &TraceScene,
+        path: &Path,
+        at: &Interaction,
+        bsdf: &Bsdf,
+        followed: Lobes,
+        light: u32,
+        chance: f32,
+        sample: &LightSample,
+    ) {
+        let wo = -path.ray.direction;
+        let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
+        let weight = match sample.pdf {
+            None => (diffuse + glossy) / chance,
+            Some(pdf) => {
+                let light_pdf = pdf * chance;
+                let bounce_pdf = bsdf.pdf(wo, sample.wi, followed);
+                let shared = power_heuristic(light_pdf, bounce_pdf);
+                // What no bounce would find is the light samples' alone.
+                (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
+            }
+        };
+        let mut contribution = path.throughput * weight * sample.radiance;
+        if let Some((instance, triangle)) = sample.triangle {
+            contribution *= mesh_emission(scene, instance, triangle, sample);
+        }
+        if contribution == Vec3::ZERO {
+            return;
+        }
+        let origin = at.origin_toward(sample.wi);
+        let ray = match sample.target {
+            Some(target) => Ray { origin, direction: target - origin, t_max: 1.0 },
+            None => Ray::new(origin, sample.wi),
+        };
+        // A light nearer than rounding has no ray to it, and nothing fits between.
+        if ray.direction == Vec3::ZERO {
+            return;
+        }
+        self.shadows.push(Shadow {
+            entry: path.entry,
+            sampler: path.sampler,
+            ray,
+            light,
+            triangle: sample.triangle,
+            contribution,
+            key: light.wrapping_add(path.depth << 16).wrapping_add(1 << 31),
+        });
+    }
+}
+
+/// Radiance of an emissive triangle at a sampled point.
+fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
+    let hit = Hit { t: 0.0, u: sample.uv.x, v: sample.uv.y, triangle, instance };
+    let (data, surface) = scene.surface_at(&hit);
+    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+    let corners = data.mesh.triangles[triangle as usize];
+    let uv = super::scene::interpolate(&data.mesh.uvs, corners, weights).unwrap_or_default();
+    surface.material.emission * scene.texture(surface.emission_texture, uv).truncate()
+}
+
+/// Weight of a sample of density `a` that might have been taken with density `b`.
+///
+/// Reference: E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2.2.
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    // As a ratio: squares of large densities overflow.
+    let ratio = b / a;
+    1.0 / (1.0 + ratio * ratio)
+}

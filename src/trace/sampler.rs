@@ -1,0 +1,139 @@
+//! Randomness as a function: (pixel, sample index, dimension, seed) → numbers in [0, 1).
+//!
+//! Each pair of dimensions is a (0, 2)-sequence of its own: the first two dimensions of Sobol',
+//! shuffled and scrambled by hashed Owen permutations.
+//!
+//! References: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; the permutation
+//! with better constants is N. Vegdahl's ("Building a Better LK Hash", psychopath.io, 2021).
+
+use glam::{UVec2, Vec2};
+
+/// The numbers of one sample of one pixel.
+///
+/// Even and odd samples draw from two independent sequences, one for each half of the film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampler {
+    seed: u32,
+    index: u32,
+}
+
+impl Sampler {
+    /// Sample number `index` of `pixel`; `seed` chooses another picture's worth of noise.
+    #[must_use]
+    pub fn new(pixel: UVec2, index: u32, seed: u32) -> Self {
+        let half = index & 1;
+        let seed = hash(pixel.x ^ hash(pixel.y ^ hash(seed ^ hash(half ^ 0x5bd1_e995))));
+        Self { seed, index: index >> 1 }
+    }
+
+    /// Two numbers in [0, 1), stratified together over the samples of this pixel.
+    #[must_use]
+    pub fn pair(&self, dimension: u32) -> Vec2 {
+        let seed = hash(self.seed ^ dimension.wrapping_mul(0x9e37_79b9));
+        let index = owen_scramble(self.index, seed);
+        let x = owen_scramble(index.reverse_bits(), hash(seed ^ 0x68bc_21eb));
+        let y = owen_scramble(sobol_1(index), hash(seed ^ 0x02e5_be93));
+        Vec2::new(unit_float(x), unit_float(y))
+    }
+
+    /// A number in [0, 1) that depends on `key` without any stratification.
+    #[must_use]
+    pub fn hashed(&self, key: u32) -> f32 {
+        unit_float(hash(hash(self.seed ^ key) ^ self.index))
+    }
+}
+
+/// The top 24 bits as a number in [0, 1); never 1, whatever `x` is.
+#[must_use]
+pub fn unit_float(x: u32) -> f32 {
+    (x >> 8) as f32 / (1 << 24) as f32
+}
+
+/// An integer hash with good avalanche: C. Wellons' "lowbias32" (nullprogram.com, 2018).
+#[must_use]
+pub fn hash(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ x >> 16
+}
+
+/// Owen's nested uniform scrambling of the binary digits of `x`, most significant first.
+fn owen_scramble(x: u32, seed: u32) -> u32 {
+    let mut x = x.reverse_bits();
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(seed);
+    x = x.wrapping_mul((seed >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
+    x.reverse_bits()
+}
+
+/// The second dimension of the Sobol' sequence (the first is the reversed bits of the index).
+fn sobol_1(index: u32) -> u32 {
+    // The generator matrix is Pascal's triangle modulo 2, so multiplying by it is five sweeps.
+    let mut x = index.reverse_bits();
+    x ^= x >> 16 & 0x0000_ffff;
+    x ^= x >> 8 & 0x00ff_00ff;
+    x ^= x >> 4 & 0x0f0f_0f0f;
+    x ^= x >> 2 & 0x3333_3333;
+    x ^ x >> 1 & 0x5555_5555
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_number_reaches_one() {
+        for x in [0, 0xffff_ff80, 0xffff_ffff] {
+            assert!((0.0..1.0).contains(&unit_float(x)));
+        }
+    }
+
+    #[test]
+    fn second_sobol_dimension_is_that_of_the_direction_numbers() {
+        for index in 0..4096_u32 {
+            let (mut n, mut v, mut expected) = (index, 1u32 << 31, 0);
+            while n != 0 {
+                if n & 1 == 1 {
+                    expected ^= v;
+                }
+                n >>= 1;
+                v ^= v >> 1;
+            }
+            assert_eq!(sobol_1(index), expected, "at {index}");
+        }
+    }
+
+    /// A (0, m, 2)-net: each elementary interval of area 2⁻ᵐ holds exactly one of 2ᵐ points.
+    #[test]
+    fn each_half_of_each_pair_is_a_net() {
+        for (m, dimension, half) in [(4, 0, 0), (8, 3, 0), (10, 7, 1), (16, 70, 1)] {
+            let n = 1u32 << m;
+            let points: Vec<Vec2> =
+                (0..n).map(|i| Sampler::new(UVec2::new(5, 9), 2 * i + half, 1).pair(dimension)).collect();
+            for split in 0..=m {
+                let mut filled = vec![false; n as usize];
+                for p in &points {
+                    let x = (p.x * (1u32 << split) as f32) as usize;
+                    let y = (p.y * (1u32 << (m - split)) as f32) as usize;
+                    filled[y << split | x] = true;
+                }
+                assert!(filled.iter().all(|&f| f), "m {m}, split {split}");
+            }
+        }
+    }
+
+    #[test]
+    fn scrambling_is_uniform_over_seeds() {
+        // χ² of one point over 10,000 seeds in 100 bins; 99.99 % of uniform ones stay below 161.
+        let mut bins = [0u32; 100];
+        for seed in 0..10_000 {
+            bins[(Sampler::new(UVec2::new(3, 4), 6, seed).pair(2).x * 100.0) as usize] += 1;
+        }
+        let chi2: f64 = bins.iter().map(|&b| (f64::from(b) - 100.0).powi(2) / 100.0).sum();
+        assert!(chi2 < 161.0, "χ² = {chi2}");
+    }
+}

@@ -1,0 +1,161 @@
+//! The scene as rays need it: flat arrays, indices for references.
+
+use super::lights::Lights;
+use super::texture::lookup;
+use super::{RenderSettings, Viewpoint};
+use crate::bvh::{Hit, Ray, Tlas};
+use crate::scene::{Alpha, Material, Texture, TriangleMesh};
+use bevy_ecs::prelude::*;
+use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
+use std::sync::Arc;
+
+/// Everything a ray can hit, and what shading looks up there.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Geometry {
+    /// The hierarchy. Its instance indices are those of `instances`.
+    pub tlas: Tlas,
+    /// One for each placement.
+    pub instances: Vec<InstanceData>,
+}
+
+/// What shading looks up of an instance.
+#[derive(Clone, Debug)]
+pub struct InstanceData {
+    /// The shared mesh.
+    pub mesh: Arc<TriangleMesh>,
+    /// Indices into [`Surfaces::materials`], by slot.
+    pub materials: Vec<u32>,
+    /// `world_from_local` for normals: the inverse transpose.
+    pub normal_matrix: DMat3,
+}
+
+/// All materials and textures.
+#[derive(Resource, Clone, Debug)]
+pub struct Surfaces {
+    /// Number 0 is the default material.
+    pub materials: Vec<Surface>,
+    /// All textures.
+    pub textures: Vec<Texture>,
+    /// Some material is not opaque, so hits have to be asked whether they are there.
+    pub has_alpha: bool,
+}
+
+impl Default for Surfaces {
+    fn default() -> Self {
+        Self { materials: vec![Surface::from(Material::default())], textures: Vec::new(), has_alpha: false }
+    }
+}
+
+/// A [`Material`] with its textures resolved to indices.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// The material; its texture references are not for here.
+    pub material: Material,
+    /// Base colour and alpha.
+    pub base_color_texture: Option<TextureIndex>,
+    /// Roughness in green, metalness in blue.
+    pub glossy_texture: Option<TextureIndex>,
+    /// Emission.
+    pub emission_texture: Option<TextureIndex>,
+}
+
+/// A texture and how to reach into it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureIndex {
+    /// Index into [`Surfaces::textures`].
+    pub index: u32,
+    /// `texture_from_mesh` coordinates.
+    pub uv_transform: Affine2,
+}
+
+impl From<Material> for Surface {
+    fn from(material: Material) -> Self {
+        Self { material, base_color_texture: None, glossy_texture: None, emission_texture: None }
+    }
+}
+
+/// Borrowed view of all that the picture depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct TraceScene<'a> {
+    /// What rays hit.
+    pub geometry: &'a Geometry,
+    /// What it is made of.
+    pub surfaces: &'a Surfaces,
+    /// What shines.
+    pub lights: &'a Lights,
+    /// From where it is seen.
+    pub viewpoint: &'a Viewpoint,
+    /// How.
+    pub settings: &'a RenderSettings,
+}
+
+impl<'a> TraceScene<'a> {
+    /// The instance and the material of a hit.
+    #[must_use]
+    pub fn surface_at(&self, hit: &Hit) -> (&'a InstanceData, &'a Surface) {
+        let instance = &self.geometry.instances[hit.instance as usize];
+        let slot = instance.mesh.slot(hit.triangle as usize);
+        let material = instance.materials.get(slot).copied().unwrap_or(0);
+        let materials = &self.surfaces.materials;
+        (instance, materials.get(material as usize).unwrap_or(&materials[0]))
+    }
+
+    /// `texture` at mesh coordinates `uv`, white where there is none.
+    #[must_use]
+    pub fn texture(&self, texture: Option<TextureIndex>, uv: Vec2) -> Vec4 {
+        let Some(TextureIndex { index, uv_transform }) = texture else { return Vec4::ONE };
+        let Some(texture) = self.surfaces.textures.get(index as usize) else { return Vec4::ONE };
+        let filter = self.settings.filter.unwrap_or(texture.filter);
+        lookup(texture, filter, uv_transform.transform_point2(uv))
+    }
+
+    /// The nearest hit that is there: what alpha lets through is not. `random` in [0, 1) decides about
+    /// partial coverage, as a function of the hit's key.
+    #[must_use]
+    pub fn closest_hit(&self, ray: &Ray, random: impl Fn(u32) -> f32) -> Option<Hit> {
+        if self.surfaces.has_alpha {
+            self.geometry.tlas.closest_accepted(ray, |hit| self.covers(hit, &random))
+        } else {
+            self.geometry.tlas.closest_hit(ray)
+        }
+    }
+
+    /// Whether something is there, not counting triangle `ignored` = (instance, triangle).
+    #[must_use]
+    pub fn any_hit(&self, ray: &Ray, ignored: Option<(u32, u32)>, random: impl Fn(u32) -> f32) -> bool {
+        let counts = |hit: &Hit| ignored != Some((hit.instance, hit.triangle));
+        if self.surfaces.has_alpha {
+            self.geometry.tlas.any_accepted(ray, |hit| counts(hit) && self.covers(hit, &random))
+        } else if ignored.is_some() {
+            self.geometry.tlas.any_accepted(ray, counts)
+        } else {
+            self.geometry.tlas.any_hit(ray)
+        }
+    }
+
+    fn covers(&self, hit: &Hit, random: impl Fn(u32) -> f32) -> bool {
+        let (instance, surface) = self.surface_at(hit);
+        let alpha = |()| {
+            let corners = instance.mesh.triangles[hit.triangle as usize];
+            let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+            let uv = interpolate(&instance.mesh.uvs, corners, weights).unwrap_or(Vec2::ZERO);
+            let vertex = interpolate(&instance.mesh.colors, corners, weights).map_or(1.0, |c: Vec4| c.w);
+            surface.material.opacity * vertex * self.texture(surface.base_color_texture, uv).w
+        };
+        match surface.material.alpha {
+            Alpha::Opaque => true,
+            Alpha::Mask(cutoff) => alpha(()) >= cutoff,
+            Alpha::Blend => random(hit.instance.wrapping_mul(0x9e37_79b9) ^ hit.triangle) < alpha(()),
+        }
+    }
+}
+
+/// A vertex attribute inside a triangle; `None` if the mesh doesn't have it.
+#[must_use]
+pub fn interpolate<T>(attribute: &[T], corners: [u32; 3], weights: Vec3) -> Option<T>
+where
+    T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
+{
+    let [a, b, c] = corners.map(|i| attribute.get(i as usize).copied());
+    Some(a? * weights.x + b? * weights.y + c? * weights.z)
+}

@@ -1,0 +1,119 @@
+//! A hit made ready for shading.
+
+use super::TraceScene;
+use super::bsdf::Bsdf;
+use super::scene::{InstanceData, interpolate};
+use crate::bvh::{Hit, Ray};
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+/// The place where a ray met a surface, in render space.
+#[derive(Clone, Copy, Debug)]
+pub struct Interaction {
+    /// The point, from barycentrics: nearer to the triangle's plane than `origin + t · direction`.
+    pub position: Vec3,
+    /// Bound on how far off the plane a ray starting here may seem to be, in each axis.
+    pub error: Vec3,
+    /// Unit geometric normal on the side that the ray came from.
+    pub geometric_normal: Vec3,
+    /// Unit interpolated normal, on the same side; the geometric one where that is impossible.
+    pub normal: Vec3,
+    /// Texture coordinates; zero if the mesh has none.
+    pub uv: Vec2,
+    /// Vertex colour; white if the mesh has none.
+    pub color: Vec4,
+    /// The ray came from the front (counter-clockwise) side.
+    pub front: bool,
+}
+
+/// 2⁻²⁴, the rounding unit of f32.
+const UNIT: f64 = 1.0 / (1 << 24) as f64;
+
+impl Interaction {
+    /// Looks up `hit` of `ray` on `instance`, placed by number `hit.instance`.
+    #[must_use]
+    pub fn new(scene: &TraceScene, instance: &InstanceData, hit: &Hit, ray: &Ray) -> Self {
+        let mesh = &*instance.mesh;
+        let placement = &scene.geometry.tlas.placements()[hit.instance as usize];
+        let corners = mesh.corners(hit.triangle as usize).map(Vec3::as_dvec3);
+        let indices = mesh.triangles[hit.triangle as usize];
+        let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+
+        // In double precision the point lies in the plane whatever the rounding of u and v.
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let shares = [corners[0] * (1.0 - u - v), corners[1] * u, corners[2] * v];
+        let local = shares[0] + shares[1] + shares[2];
+        let world_from_local = placement.world_from_local();
+        let position = world_from_local.transform_point3(local);
+
+        // The next ray rounds its origin in local space and tests with distances to the corners.
+        let local_error = (shares[0].abs() + shares[1].abs() + shares[2].abs()) * (8.0 * UNIT);
+        let m = world_from_local.matrix3;
+        let spread = m.x_axis.abs() * local_error.x + m.y_axis.abs() * local_error.y + m.z_axis.abs() * local_error.z;
+        let error = spread + position.abs() * (2.0 * UNIT);
+
+        // The inverse transpose keeps sides, also under a mirroring placement.
+        let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let facet = (instance.normal_matrix * facet.normalize_or(DVec3::Z)).normalize_or(DVec3::Z).as_vec3();
+        let front = facet.dot(ray.direction) < 0.0;
+        let geometric_normal = if front { facet } else { -facet };
+
+        let normal = interpolate(&mesh.normals, indices, weights)
+            .and_then(|n: Vec3| (instance.normal_matrix * n.as_dvec3()).try_normalize())
+            .map_or(geometric_normal, |n| {
+                let n = if front { n } else { -n }.as_vec3();
+                // A normal that faces away from the eye would shade black: use the facet there.
+                if n.dot(ray.direction) < 0.0 && n.dot(geometric_normal) > 0.0 { n } else { geometric_normal }
+            });
+        Self {
+            position: position.as_vec3(),
+            error: error.as_vec3(),
+            geometric_normal,
+            normal,
+            uv: interpolate(&mesh.uvs, indices, weights).unwrap_or(Vec2::ZERO),
+            color: interpolate(&mesh.colors, indices, weights).unwrap_or(Vec4::ONE),
+            front,
+        }
+    }
+
+    /// Where a ray that leaves toward `direction` starts: off the surface by just more than the
+    /// rounding errors, so that it meets neither its own triangle nor leaps over a near one.
+    ///
+    /// Reference: M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th ed., 6.8.6.
+    #[must_use]
+    pub fn origin_toward(&self, direction: Vec3) -> Vec3 {
+        let n = self.geometric_normal;
+        offset(self.position, self.error, if n.dot(direction) < 0.0 { -n } else { n })
+    }
+
+    /// The surface's scattering here, seen from where the ray came.
+    #[must_use]
+    pub fn bsdf(&self, scene: &TraceScene, surface: &super::scene::Surface) -> Bsdf {
+        Bsdf::new(scene, surface, self)
+    }
+
+    /// Radiance that the surface itself sends back along the ray.
+    #[must_use]
+    pub fn emission(&self, scene: &TraceScene, surface: &super::scene::Surface) -> Vec3 {
+        let material = &surface.material;
+        if material.emission == Vec3::ZERO || !(self.front || material.double_sided) {
+            return Vec3::ZERO;
+        }
+        material.emission * scene.texture(surface.emission_texture, self.uv).truncate()
+    }
+}
+
+/// `point` moved along `normal` until it is clear of the error box around itself.
+#[must_use]
+pub fn offset(point: Vec3, error: Vec3, normal: Vec3) -> Vec3 {
+    let moved = point + normal * error.dot(normal.abs());
+    let outward = |p: f32, n: f32| {
+        if n > 0.0 {
+            p.next_up()
+        } else if n < 0.0 {
+            p.next_down()
+        } else {
+            p
+        }
+    };
+    Vec3::new(outward(moved.x, normal.x), outward(moved.y, normal.y), outward(moved.z, normal.z))
+}
