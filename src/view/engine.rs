@@ -10,7 +10,8 @@ use super::hud::Status;
 use super::input::{Command, Input};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
 use crate::image::{Display, Picture};
-use crate::scene::{ActiveCamera, propagate_transforms};
+use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
+use crate::sync::Redone;
 use crate::trace::RenderSettings;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
@@ -27,6 +28,9 @@ const RESTING: std::ops::RangeInclusive<Duration> =
     Duration::from_millis(30)..=Duration::from_millis(100);
 /// The longer the view rests, the rarer the pictures: this share of the time since it changed.
 const RESTING_SHARE: f64 = 0.1;
+
+/// Speed at the start, in radii of the scene per second.
+const RADII_PER_SECOND: f64 = 0.5;
 
 /// What the engine tells the window's thread to look at.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -122,13 +126,13 @@ impl<W: Fn(Wake)> Engine<W> {
                     .clamp(*RESTING.start(), *RESTING.end()),
             });
 
-            let before = app.world.resource::<FrameStats>().resets;
+            let resets = app.world.resource::<Redone>().resets;
             let version = app.world.resource::<Picture>().version;
             app.frame();
             app.world.resource_mut::<Input>().end_frame();
 
             let stats = app.world.resource::<FrameStats>();
-            let moving = moving || stats.resets != before;
+            let moving = moving || app.world.resource::<Redone>().resets != resets;
             if moving {
                 view_changed_at = Instant::now();
             }
@@ -202,7 +206,8 @@ fn prepare(app: &mut App, sample_target: u32, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
     if !app.world.contains_resource::<FlySpeed>() {
-        app.world.insert_resource(FlySpeed(1.0));
+        let radius = app.world.get_resource::<SceneBounds>().map_or(2.0, |bounds| bounds.radius);
+        app.world.insert_resource(FlySpeed(RADII_PER_SECOND * radius));
     }
     app.add_systems(
         (
@@ -240,7 +245,7 @@ fn status(app: &App) -> Status {
         noise: stats.noise,
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
-        resets: stats.resets,
+        resets: world.resource::<Redone>().resets,
         dropped: stats.dropped,
         exposure: display.exposure,
         tone_map: display.tone_map,
