@@ -14,3 +14,5 @@ pub mod render;
 pub mod scene;
 pub mod sync;
 pub mod trace;
+#[cfg(feature = "view")]
+pub mod view;

@@ -1,0 +1,215 @@
+//! Keys that change how the picture is made or shown, and what they answer.
+
+use super::fly::camera_flags;
+use super::input::Input;
+use super::keymap::Tap;
+use crate::image::{Display, ToneMap};
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform};
+use crate::trace::{Integrator, RenderSettings};
+use bevy_ecs::prelude::*;
+
+/// Whether refinement rests. The view still follows the camera.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Paused(pub bool);
+
+/// What the program says to the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// In the window.
+    Text(String),
+    /// In the window and on standard output, to be pasted elsewhere.
+    Print(String),
+}
+
+/// Notices that nobody has seen yet.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Notices(pub Vec<Notice>);
+
+/// Size, filter and integrator; all of them restart the accumulation, and so does R.
+pub fn change_settings(
+    input: Res<Input>,
+    mut settings: ResMut<RenderSettings>,
+    mut notices: ResMut<Notices>,
+) {
+    let mut wanted = *settings;
+    if let Some(size) = input.resize {
+        wanted.size = size;
+    }
+    for (tap, _) in &input.taps {
+        let said = match tap {
+            Tap::Filter => {
+                wanted.filter = match wanted.filter {
+                    None => Some(Filter::Nearest),
+                    Some(Filter::Nearest) => Some(Filter::Bilinear),
+                    Some(Filter::Bilinear) => None,
+                };
+                format!("texture filter: {}", filter_name(wanted.filter))
+            }
+            Tap::Integrator => {
+                wanted.integrator = match wanted.integrator {
+                    Integrator::Direct => Integrator::Path,
+                    Integrator::Path => Integrator::Direct,
+                };
+                format!("integrator: {}", integrator_name(wanted.integrator))
+            }
+            _ => continue,
+        };
+        notices.0.push(Notice::Text(said));
+    }
+    settings.set_if_neq(wanted);
+    if input.count(Tap::Restart) > 0 {
+        settings.set_changed();
+    }
+}
+
+/// Exposure and tone map, which leave the film alone.
+pub fn change_display(input: Res<Input>, mut display: ResMut<Display>) {
+    let mut wanted = *display;
+    for &(tap, shift) in &input.taps {
+        let thirds = if shift { 3.0 } else { 1.0 };
+        match tap {
+            Tap::Brighter => wanted.exposure = step_exposure(wanted.exposure, thirds),
+            Tap::Darker => wanted.exposure = step_exposure(wanted.exposure, -thirds),
+            Tap::ToneMap => {
+                wanted.tone_map = match wanted.tone_map {
+                    ToneMap::Clip => ToneMap::Neutral,
+                    ToneMap::Neutral => ToneMap::Clip,
+                };
+            }
+            _ => {}
+        }
+    }
+    display.set_if_neq(wanted);
+}
+
+/// `exposure` moved by `thirds` of a stop, on the grid of thirds: three steps are one stop exactly.
+fn step_exposure(exposure: f32, thirds: f32) -> f32 {
+    ((exposure * 3.0).round() + thirds).clamp(-90.0, 90.0) / 3.0
+}
+
+/// Pause and resume.
+pub fn change_pause(input: Res<Input>, mut paused: ResMut<Paused>) {
+    let flipped = paused.0 ^ (input.count(Tap::Pause) % 2 == 1);
+    paused.set_if_neq(Paused(flipped));
+}
+
+/// Says the active camera as command line flags.
+pub fn print_camera(
+    input: Res<Input>,
+    active: Res<ActiveCamera>,
+    cameras: Query<(&Camera, &GlobalTransform)>,
+    mut notices: ResMut<Notices>,
+) {
+    if input.count(Tap::PrintCamera) > 0
+        && let Ok((camera, pose)) = cameras.get(active.0)
+    {
+        notices.0.push(Notice::Print(camera_flags(*camera, *pose)));
+    }
+}
+
+/// What the user calls it.
+#[must_use]
+pub fn filter_name(filter: Option<Filter>) -> &'static str {
+    match filter {
+        None => "as the file says",
+        Some(Filter::Nearest) => "nearest",
+        Some(Filter::Bilinear) => "bilinear",
+    }
+}
+
+/// What the user calls it.
+#[must_use]
+pub fn integrator_name(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::Direct => "direct",
+        Integrator::Path => "path",
+    }
+}
+
+/// What the user calls it.
+#[must_use]
+pub fn tone_map_name(tone_map: ToneMap) -> &'static str {
+    match tone_map {
+        ToneMap::Clip => "clip",
+        ToneMap::Neutral => "neutral",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::UVec2;
+    use std::time::Instant;
+
+    fn run(taps: &[(Tap, bool)], resize: Option<UVec2>) -> World {
+        let mut world = World::new();
+        world.init_resource::<RenderSettings>();
+        world.init_resource::<Display>();
+        world.init_resource::<Notices>();
+        world.init_resource::<Paused>();
+        world.clear_trackers();
+        let mut input = Input::new(Instant::now());
+        input.taps = taps.to_vec();
+        input.resize = resize;
+        world.insert_resource(input);
+        let mut schedule = Schedule::default();
+        schedule.add_systems((change_settings, change_display, change_pause).chain());
+        schedule.run(&mut world);
+        world
+    }
+
+    #[test]
+    fn three_thirds_are_a_stop() {
+        let world = run(
+            &[
+                (Tap::Brighter, false),
+                (Tap::Brighter, false),
+                (Tap::Brighter, false),
+            ],
+            None,
+        );
+        assert_eq!(world.resource::<Display>().exposure, 1.0);
+        let world = run(&[(Tap::Darker, true), (Tap::Brighter, false)], None);
+        assert_eq!(world.resource::<Display>().exposure, -2.0 / 3.0);
+    }
+
+    #[test]
+    fn exposure_and_tone_map_do_not_touch_the_settings_that_reset_the_film() {
+        let world = run(
+            &[
+                (Tap::Brighter, true),
+                (Tap::ToneMap, false),
+                (Tap::Pause, false),
+            ],
+            None,
+        );
+        assert!(world.is_resource_changed::<Display>());
+        assert!(!world.is_resource_changed::<RenderSettings>());
+    }
+
+    #[test]
+    fn restart_marks_the_settings_although_they_stay_the_same() {
+        let world = run(&[(Tap::Restart, false)], None);
+        assert!(world.is_resource_changed::<RenderSettings>());
+        assert_eq!(
+            *world.resource::<RenderSettings>(),
+            RenderSettings::default()
+        );
+    }
+
+    #[test]
+    fn the_same_size_again_is_no_change() {
+        let size = RenderSettings::default().size;
+        assert!(!run(&[], Some(size)).is_resource_changed::<RenderSettings>());
+        assert!(run(&[], Some(size + 1)).is_resource_changed::<RenderSettings>());
+    }
+
+    #[test]
+    fn three_presses_bring_the_filter_back() {
+        let press = (Tap::Filter, false);
+        let filter = |taps: &[_]| run(taps, None).resource::<RenderSettings>().filter;
+        assert_eq!(filter(&[press]), Some(Filter::Nearest));
+        assert_eq!(filter(&[press, press]), Some(Filter::Bilinear));
+        assert_eq!(filter(&[press, press, press]), None);
+    }
+}

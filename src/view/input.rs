@@ -1,0 +1,224 @@
+//! What the user does, from the window's thread to the frame's systems.
+
+use super::keymap::{Hold, Tap};
+use bevy_ecs::prelude::*;
+use glam::{DVec2, UVec2};
+use std::time::Instant;
+
+/// From the window to the engine.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Exactly these keys are down from `at` on.
+    Held {
+        /// By [`Hold`].
+        held: [bool; Hold::COUNT],
+        /// When the event arrived.
+        at: Instant,
+    },
+    /// The mouse looked around.
+    Look {
+        /// To the right and down, in mouse pixels.
+        pixels: DVec2,
+        /// When the event arrived.
+        at: Instant,
+    },
+    /// The wheel turned: notches, away from the user is positive.
+    Wheel(f64),
+    /// A key was pressed (or repeated).
+    Tap {
+        /// Its meaning.
+        tap: Tap,
+        /// Whether Shift was down.
+        shift: bool,
+        /// When the event arrived.
+        at: Instant,
+    },
+    /// The window's inside has this many pixels, each side at least 1.
+    Resize(UVec2),
+    /// End the engine.
+    Quit,
+}
+
+/// Longest time that one frame may move the camera by, seconds: after a hitch one does not find
+/// oneself on the other side of the scene.
+const LONGEST_STEP: f64 = 0.1;
+
+/// What the user did since the last frame. Systems of `FrameSystems::Input` read it.
+#[derive(Resource, Clone, Debug)]
+pub struct Input {
+    held: [bool; Hold::COUNT],
+    seconds: [f64; Hold::COUNT],
+    since: Instant,
+    /// Mouse motion to the right and down, pixels.
+    pub look: DVec2,
+    /// Wheel notches.
+    pub wheel: f64,
+    /// Key presses, with whether Shift was down.
+    pub taps: Vec<(Tap, bool)>,
+    /// New size of the picture.
+    pub resize: Option<UVec2>,
+}
+
+impl Input {
+    /// Nothing is held at `now`.
+    #[must_use]
+    pub fn new(now: Instant) -> Self {
+        Self {
+            held: [false; Hold::COUNT],
+            seconds: [0.0; Hold::COUNT],
+            since: now,
+            look: DVec2::ZERO,
+            wheel: 0.0,
+            taps: Vec::new(),
+            resize: None,
+        }
+    }
+
+    /// Takes note of `command`. Returns when the user asked for another view, if that is what it does.
+    pub fn apply(&mut self, command: &Command) -> Option<Instant> {
+        match *command {
+            Command::Held { held, at } => {
+                let pressed = held
+                    .iter()
+                    .zip(self.held)
+                    .any(|(&now, before)| now && !before);
+                self.hold_until(at);
+                self.held = held;
+                (pressed && self.is_moving()).then_some(at)
+            }
+            Command::Look { pixels, at } => {
+                self.look += pixels;
+                Some(at)
+            }
+            Command::Wheel(notches) => {
+                self.wheel += notches;
+                None
+            }
+            Command::Tap { tap, shift, at } => {
+                self.taps.push((tap, shift));
+                matches!(
+                    tap,
+                    Tap::ResetCamera | Tap::PreviousCamera | Tap::NextCamera
+                )
+                .then_some(at)
+            }
+            Command::Resize(size) => {
+                self.resize = Some(size);
+                None
+            }
+            Command::Quit => None,
+        }
+    }
+
+    /// Adds the time until `now` to the keys that are down.
+    ///
+    /// Time is counted from event to event, so a tap between two frames is not lost, and motion does
+    /// not depend on when frames happen.
+    pub fn hold_until(&mut self, now: Instant) {
+        let step = now.saturating_duration_since(self.since).as_secs_f64();
+        for (seconds, _) in self
+            .seconds
+            .iter_mut()
+            .zip(self.held)
+            .filter(|(_, held)| *held)
+        {
+            *seconds = (*seconds + step).min(LONGEST_STEP);
+        }
+        self.since = self.since.max(now);
+    }
+
+    /// Forgets what has been done with; what is held stays held.
+    pub fn end_frame(&mut self) {
+        self.seconds = [0.0; Hold::COUNT];
+        self.look = DVec2::ZERO;
+        self.wheel = 0.0;
+        self.taps.clear();
+        self.resize = None;
+    }
+
+    /// How long `key` was down since the last frame, seconds in 0..=0.1.
+    #[must_use]
+    pub fn seconds(&self, key: Hold) -> f64 {
+        self.seconds[key as usize]
+    }
+
+    /// Whether the camera was moved or turned since the last frame.
+    #[must_use]
+    pub fn has_motion(&self) -> bool {
+        self.look != DVec2::ZERO || self.seconds[..Hold::Fast as usize].iter().any(|&s| s > 0.0)
+    }
+
+    /// Seconds of `plus` less seconds of `minus`.
+    #[must_use]
+    pub fn axis(&self, plus: Hold, minus: Hold) -> f64 {
+        self.seconds(plus) - self.seconds(minus)
+    }
+
+    /// Whether `key` is down, or was for a moment since the last frame.
+    #[must_use]
+    pub fn is_held(&self, key: Hold) -> bool {
+        self.held[key as usize] || self.seconds(key) > 0.0
+    }
+
+    /// Whether a key that moves or turns the camera is down.
+    #[must_use]
+    pub fn is_moving(&self) -> bool {
+        self.held[..Hold::Fast as usize].iter().any(|&held| held)
+    }
+
+    /// How often `tap` was pressed since the last frame.
+    #[must_use]
+    pub fn count(&self, tap: Tap) -> usize {
+        self.taps.iter().filter(|(t, _)| *t == tap).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    fn only(key: Hold) -> [bool; Hold::COUNT] {
+        let mut held = [false; Hold::COUNT];
+        held[key as usize] = true;
+        held
+    }
+
+    #[test]
+    fn a_tap_between_two_frames_counts_for_as_long_as_it_lasted() {
+        let start = Instant::now();
+        let at = |ms| start + Duration::from_millis(ms);
+        let mut input = Input::new(start);
+        assert_eq!(
+            input.apply(&Command::Held {
+                held: only(Hold::Forward),
+                at: at(500)
+            }),
+            Some(at(500))
+        );
+        assert_eq!(
+            input.apply(&Command::Held {
+                held: [false; Hold::COUNT],
+                at: at(520)
+            }),
+            None
+        );
+        input.hold_until(at(700));
+        assert!((input.seconds(Hold::Forward) - 0.020).abs() < 1e-9);
+        assert!(!input.is_moving());
+        input.end_frame();
+        assert_eq!(input.seconds(Hold::Forward), 0.0);
+    }
+
+    #[test]
+    fn a_hitch_moves_by_a_tenth_of_a_second_at_most() {
+        let start = Instant::now();
+        let mut input = Input::new(start);
+        input.apply(&Command::Held {
+            held: only(Hold::Back),
+            at: start,
+        });
+        input.hold_until(start + Duration::from_secs(5));
+        assert_eq!(input.seconds(Hold::Back), LONGEST_STEP);
+    }
+}

@@ -1,0 +1,146 @@
+//! What people see: a window that is never busy, over an engine that always is.
+//!
+//! Two threads. The window's ([`window`]) handles events, draws and presents; the engine's
+//! ([`engine`]) owns the [`App`] and runs its frames. [`input::Command`]s go one way over a channel,
+//! pictures the other way over a shared slot. What a key does stands in [`keymap`], and what it does
+//! to the world in [`fly`] and [`controls`].
+
+pub mod controls;
+pub mod engine;
+pub mod fly;
+pub mod hud;
+pub mod input;
+pub mod keymap;
+pub mod screen;
+pub mod screenshot;
+pub mod window;
+
+use crate::app::App;
+use engine::Wake;
+use glam::UVec2;
+use std::time::Duration;
+use winit::event_loop::{EventLoop, EventLoopBuilder};
+
+/// What the window is like.
+#[derive(Clone, Debug)]
+pub struct ViewOptions {
+    /// First words of the window's title, and of the text shown while the scene loads.
+    pub title: String,
+    /// Size of the picture when the window opens, physical pixels.
+    pub size: UVec2,
+    /// Samples per pixel to stop at.
+    pub sample_target: u32,
+    /// Screenshots are called `{screenshot_stem}_{n}.png`.
+    pub screenshot_stem: String,
+    /// Closes the window by itself after this time.
+    pub exit_after: Option<Duration>,
+}
+
+/// Why there is no window (any more).
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ViewError {
+    /// There is nothing to open a window on. The scene has not been opened.
+    #[error("no window can be opened: {0}")]
+    NoDisplay(String),
+    /// The scene could not be opened.
+    #[error("{0}")]
+    Scene(String),
+    /// The window or the engine behind it broke down.
+    #[error("the window was lost: {0}")]
+    Lost(String),
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// `open` makes the app. It runs on the engine's thread once the window is there, so a scene that
+/// loads for a minute is a window that says so for a minute. Call this on the main thread, once.
+///
+/// # Errors
+/// - [`ViewError::NoDisplay`] without a display server, its libraries or a graphics adapter;
+///   `open` has not been called then.
+/// - [`ViewError::Scene`] if `open` fails.
+/// - [`ViewError::Lost`] if the window or the engine breaks down later.
+pub fn run(
+    options: ViewOptions,
+    open: impl FnOnce() -> Result<App, String> + Send + 'static,
+) -> Result<(), ViewError> {
+    let event_loop = event_loop().map_err(ViewError::NoDisplay)?;
+    let mut viewer = window::Viewer::new(options, event_loop.create_proxy(), Box::new(open));
+    let outcome = event_loop.run_app(&mut viewer);
+    viewer.finish()?;
+    outcome.map_err(|e| ViewError::Lost(e.to_string()))
+}
+
+fn event_loop() -> Result<EventLoop<Wake>, String> {
+    let mut builder = EventLoop::<Wake>::with_user_event();
+    prefer_what_is_there(&mut builder)?;
+    // A missing libxkbcommon-x11 is a panic in there.
+    screen::quietly(|| builder.build())
+        .map_err(|panic| format!("a library is missing: {panic}"))?
+        .map_err(|e| without_place(&e.to_string()).to_owned())
+}
+
+/// Without the source file and line that winit begins its messages with.
+fn without_place(message: &str) -> &str {
+    match message
+        .strip_prefix("os error at ")
+        .and_then(|rest| rest.split_once(": "))
+    {
+        Some((_, what)) => what,
+        None => message,
+    }
+}
+
+/// Chooses X11 if the Wayland display that the environment names does not answer: the event loop
+/// would not fall back by itself, and cannot be tried twice.
+#[cfg(target_os = "linux")]
+fn prefer_what_is_there(builder: &mut EventLoopBuilder<Wake>) -> Result<(), String> {
+    use std::env::var_os;
+    use std::os::unix::net::UnixStream;
+    use std::path::PathBuf;
+    use winit::platform::x11::EventLoopBuilderExtX11;
+
+    let set = |name| var_os(name).filter(|value| !value.is_empty());
+    let (wayland, x11) = (set("WAYLAND_DISPLAY"), set("DISPLAY"));
+    if set("WAYLAND_SOCKET").is_some() {
+        return Ok(());
+    }
+    let Some(name) = wayland else {
+        return match x11 {
+            Some(_) => Ok(()),
+            None => Err("neither DISPLAY nor WAYLAND_DISPLAY is set".to_owned()),
+        };
+    };
+    // `join` keeps an absolute name as it is.
+    let socket = set("XDG_RUNTIME_DIR")
+        .map(PathBuf::from)
+        .unwrap_or_default()
+        .join(name);
+    if x11.is_some() && UnixStream::connect(&socket).is_err() {
+        builder.with_x11();
+    }
+    Ok(())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn prefer_what_is_there(_: &mut EventLoopBuilder<Wake>) -> Result<(), String> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_tell_what_is_wrong_and_not_where_in_the_source() {
+        assert_eq!(
+            without_place("os error at /a/b.rs:7: no display: :9"),
+            "no display: :9"
+        );
+        assert_eq!(
+            without_place("the requested operation is not supported"),
+            "the requested operation is not supported"
+        );
+    }
+}

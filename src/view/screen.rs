@@ -1,0 +1,189 @@
+//! The window and the surface that its pixels are presented on.
+
+use super::engine::{lock, panic_message};
+use super::without_place;
+use glam::UVec2;
+use pixels::wgpu::{DeviceType, SurfaceError};
+use pixels::{Error, Pixels, SurfaceTexture};
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use winit::dpi::PhysicalSize;
+use winit::event_loop::ActiveEventLoop;
+use winit::window::{Fullscreen, Window};
+
+/// After so many failures in a row the surface is asked less often.
+const PATIENCE: u32 = 20;
+
+/// What became of a picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Presented {
+    /// It is on its way to the screen.
+    Yes,
+    /// Not now; try again after this time.
+    Later(Duration),
+    /// Never again.
+    Lost(String),
+}
+
+/// A window that shows bytes.
+pub struct Screen {
+    // Before the window: the surface goes first.
+    pixels: Pixels<'static>,
+    /// The window.
+    pub window: Arc<Window>,
+    /// Whether the "GPU" is this machine's CPU, so that presenting takes time from tracing.
+    pub software: bool,
+    size: UVec2,
+    failures: u32,
+    device_error: Arc<Mutex<Option<String>>>,
+}
+
+impl Screen {
+    /// Opens a window with `size` physical pixels inside, if the desktop allows.
+    pub fn open(event_loop: &ActiveEventLoop, title: &str, size: UVec2) -> Result<Self, String> {
+        let attributes = Window::default_attributes()
+            .with_title(title)
+            .with_inner_size(PhysicalSize::new(size.x.max(1), size.y.max(1)));
+        #[cfg(target_os = "linux")]
+        let attributes = winit::platform::x11::WindowAttributesExtX11::with_name(
+            attributes, "penumbra", "penumbra",
+        );
+        let window = event_loop
+            .create_window(attributes)
+            .map_err(|e| format!("cannot open a window: {}", without_place(&e.to_string())))?;
+        let window = Arc::new(window);
+        let size = vector(window.inner_size()).max(UVec2::ONE);
+        let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(&window));
+        // wgpu panics if WGPU_ADAPTER_NAME matches nothing.
+        let pixels = quietly(|| Pixels::new(size.x, size.y, surface))
+            .map_err(|panic| format!("no graphics adapter: {panic}"))?
+            .map_err(|e| {
+                format!(
+                    "no graphics adapter (Vulkan or GL) can draw into the window: {}",
+                    with_sources(&e)
+                )
+            })?;
+        let device_error = Arc::new(Mutex::new(None));
+        let seen = Arc::clone(&device_error);
+        // wgpu's own handler panics, for instance when another program destroys the window.
+        pixels
+            .device()
+            .on_uncaptured_error(Arc::new(move |error: pixels::wgpu::Error| {
+                lock(&seen).get_or_insert_with(|| error.to_string());
+            }));
+        let software = pixels.adapter().get_info().device_type == DeviceType::Cpu;
+        Ok(Self {
+            pixels,
+            window,
+            software,
+            size,
+            failures: 0,
+            device_error,
+        })
+    }
+
+    /// Width and height of the picture on it, physical pixels, at least 1.
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// Follows the window, whose inside is now `size` pixels, each side above 0.
+    pub fn resize(&mut self, size: UVec2) {
+        let limit = self.pixels.device().limits().max_texture_dimension_2d;
+        let size = size.clamp(UVec2::ONE, UVec2::splat(limit));
+        if size != self.size
+            && self.pixels.resize_surface(size.x, size.y).is_ok()
+            && self.pixels.resize_buffer(size.x, size.y).is_ok()
+        {
+            self.size = size;
+        }
+    }
+
+    /// Lets `paint` write sRGB bytes of [`Screen::size`] pixels, and shows them.
+    pub fn draw(&mut self, paint: impl FnOnce(&mut [u8], UVec2)) -> Presented {
+        paint(self.pixels.frame_mut(), self.size);
+        self.window.pre_present_notify();
+        let outcome = self.pixels.render();
+        let device_error = lock(&self.device_error).take();
+        match (outcome, device_error) {
+            (Ok(()), None) => {
+                self.failures = 0;
+                Presented::Yes
+            }
+            (Err(Error::Surface(SurfaceError::OutOfMemory)), _) => {
+                Presented::Lost("no graphics memory is left".into())
+            }
+            (Ok(()), Some(error)) if self.failures > 2 * PATIENCE => Presented::Lost(error),
+            (Ok(()) | Err(Error::Surface(_)), _) => {
+                self.failures += 1;
+                Presented::Later(Duration::from_millis(if self.failures > PATIENCE {
+                    50
+                } else {
+                    4
+                }))
+            }
+            (Err(error), _) => Presented::Lost(with_sources(&error)),
+        }
+    }
+
+    /// The bytes drawn last.
+    pub fn bytes(&self) -> &[u8] {
+        self.pixels.frame()
+    }
+
+    /// Full screen or window.
+    pub fn toggle_full_screen(&self) {
+        let full = self
+            .window
+            .fullscreen()
+            .is_none()
+            .then_some(Fullscreen::Borderless(None));
+        self.window.set_fullscreen(full);
+    }
+}
+
+/// As a vector.
+pub fn vector(size: PhysicalSize<u32>) -> UVec2 {
+    UVec2::new(size.width, size.height)
+}
+
+/// An error with all its causes.
+fn with_sources(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text += &format!(": {cause}");
+        source = cause.source();
+    }
+    text
+}
+
+/// Runs `f`; a panic on this thread becomes an error with its message, and prints nothing.
+pub fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
+    let here = std::thread::current().id();
+    let loud = Arc::new(take_hook());
+    let others = Arc::clone(&loud);
+    set_hook(Box::new(move |info| {
+        if std::thread::current().id() != here {
+            others(info);
+        }
+    }));
+    let outcome = catch_unwind(AssertUnwindSafe(f));
+    set_hook(Box::new(move |info| loud(info)));
+    outcome.map_err(|panic| panic_message(&*panic))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quiet_panic_is_its_message() {
+        assert_eq!(quietly(|| 3), Ok(3));
+        assert_eq!(
+            quietly(|| -> u8 { panic!("no {}", "library") }),
+            Err("no library".to_owned())
+        );
+    }
+}

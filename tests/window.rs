@@ -1,0 +1,565 @@
+//! The program in a real X server, driven as a user drives it.
+//!
+//! Needs `Xvfb`, `xdotool` and ImageMagick's `import`; with `openbox` and `wmctrl` also what only a
+//! window manager can do. Without them the tests say that they were skipped, unless `CI` is set or
+//! `PENUMBRA_WINDOW_TESTS=required`: then that is a failure.
+#![cfg(all(feature = "view", target_os = "linux"))]
+
+use image::RgbImage;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Whatever takes longer hangs.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// One at a time: tests that look at the clock shall not disturb each other.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// An X server of our own, with a window manager if there is one.
+struct Desktop {
+    server: Child,
+    manager: Option<Child>,
+    display: String,
+    directory: PathBuf,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// The program in it.
+struct Program {
+    child: Child,
+    window: String,
+}
+
+fn has_tool(name: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|directory| directory.join(name).is_file())
+}
+
+/// A desktop for `test`; `None`, and a line that says so, if the tools are missing and may be.
+fn desktop(test: &str) -> Option<Desktop> {
+    let missing: Vec<&str> = ["Xvfb", "xdotool", "import"]
+        .into_iter()
+        .filter(|tool| !has_tool(tool))
+        .collect();
+    if missing.is_empty() {
+        return Some(Desktop::open(test));
+    }
+    let required = std::env::var_os("CI").is_some()
+        || std::env::var_os("PENUMBRA_WINDOW_TESTS").is_some_and(|v| v == "required");
+    assert!(
+        !required,
+        "{test}: {} must be installed",
+        missing.join(", ")
+    );
+    println!("SKIPPED {test}: not installed: {}", missing.join(", "));
+    None
+}
+
+fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(found) = found() {
+            return found;
+        }
+        assert!(start.elapsed() < PATIENCE, "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn pause(milliseconds: u64) {
+    std::thread::sleep(Duration::from_millis(milliseconds));
+}
+
+impl Desktop {
+    fn open(test: &str) -> Self {
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let directory =
+            std::env::temp_dir().join(format!("penumbra-{test}-{}", std::process::id()));
+        std::fs::create_dir_all(&directory).unwrap();
+        // The server chooses a free display itself and says which.
+        let mut server = Command::new("Xvfb")
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "1280x800x24",
+                "-nolisten",
+                "tcp",
+            ])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap())
+            .read_line(&mut number)
+            .unwrap();
+        let display = format!(":{}", number.trim());
+        let mut desktop = Self {
+            server,
+            manager: None,
+            display,
+            directory,
+            _turn: turn,
+        };
+        if has_tool("openbox") && has_tool("wmctrl") {
+            // A window that is mapped before the manager is ready stays hidden.
+            let ready = desktop.directory.join("ready");
+            let manager = desktop
+                .command("openbox")
+                .args(["--startup", &format!("touch {}", ready.display())])
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn();
+            desktop.manager = Some(manager.unwrap());
+            wait_for("the window manager", || ready.exists().then_some(()));
+            pause(100);
+        }
+        desktop
+    }
+
+    fn command(&self, program: impl AsRef<std::ffi::OsStr>) -> Command {
+        let mut command = Command::new(program);
+        command
+            .env("DISPLAY", &self.display)
+            .env("XDG_RUNTIME_DIR", &self.directory)
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .current_dir(&self.directory)
+            .stdin(Stdio::null());
+        command
+    }
+
+    fn xdotool<'a>(&self, arguments: impl IntoIterator<Item = &'a str>) -> String {
+        let output = self.command("xdotool").args(arguments).output().unwrap();
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    }
+
+    /// Starts the program and gives it the keyboard.
+    fn start(&self, arguments: &[&str]) -> Program {
+        self.start_with(arguments, &[])
+    }
+
+    fn start_with(&self, arguments: &[&str], environment: &[(&str, &str)]) -> Program {
+        let child = self
+            .command(env!("CARGO_BIN_EXE_penumbra"))
+            .args(arguments)
+            .envs(environment.iter().copied())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut program = Program {
+            child,
+            window: String::new(),
+        };
+        program.window = wait_for("the window", || {
+            assert!(
+                program.child.try_wait().unwrap().is_none(),
+                "the program ended at once"
+            );
+            let found = self.xdotool(["search", "--onlyvisible", "--class", "^penumbra$"]);
+            found.lines().next().map(str::to_owned)
+        });
+        self.focus(&program);
+        program
+    }
+
+    fn focus(&self, program: &Program) {
+        let verb = if self.manager.is_some() {
+            "windowactivate"
+        } else {
+            "windowfocus"
+        };
+        self.xdotool([verb, &program.window]);
+        wait_for("the focus", || {
+            (self.xdotool(["getwindowfocus"]) == program.window).then_some(())
+        });
+    }
+
+    fn title(&self, program: &Program) -> String {
+        self.xdotool(["getwindowname", &program.window])
+    }
+
+    /// Waits until all samples are there.
+    fn wait_until_done(&self, program: &mut Program) {
+        wait_for("the sample target", || {
+            assert!(
+                program.child.try_wait().unwrap().is_none(),
+                "the program ended"
+            );
+            self.title(program).ends_with("- done").then_some(())
+        });
+        // The last picture is on its way.
+        pause(300);
+    }
+
+    /// What the inside of the window shows.
+    fn shot(&self, program: &Program) -> RgbImage {
+        let output = self
+            .command("import")
+            .args(["-window", &program.window, "-depth", "8", "png:-"])
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        image::load_from_memory(&output.stdout).unwrap().to_rgb8()
+    }
+
+    fn size(&self, program: &Program) -> (u32, u32) {
+        let geometry = self.xdotool(["getwindowgeometry", "--shell", &program.window]);
+        let value = |name: &str| {
+            let line = geometry.lines().find_map(|line| line.strip_prefix(name));
+            line.unwrap_or_else(|| panic!("no {name} in {geometry}"))
+                .parse()
+                .unwrap()
+        };
+        (value("WIDTH="), value("HEIGHT="))
+    }
+
+    /// Waits until nothing but the picture is seen: no notice, no status lines.
+    fn hide_status(&self, program: &mut Program) {
+        // Short, long, none.
+        self.xdotool(["key", "z", "key", "z"]);
+        self.wait_until_done(program);
+    }
+}
+
+impl Drop for Desktop {
+    fn drop(&mut self) {
+        for child in self.manager.iter_mut().chain([&mut self.server]) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+        let _ = std::fs::remove_dir_all(&self.directory);
+    }
+}
+
+impl Program {
+    fn wait(&mut self) -> ExitStatus {
+        wait_for("the end of the program", || self.child.try_wait().unwrap())
+    }
+
+    fn is_alive(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_none()
+    }
+
+    /// CPU time of all threads, in clock ticks of 10 ms.
+    fn ticks(&self) -> u64 {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).unwrap();
+        // The name in parentheses may hold anything; `utime` is the twelfth field after it.
+        let fields: Vec<&str> = stat
+            .rsplit_once(')')
+            .unwrap()
+            .1
+            .split_whitespace()
+            .collect();
+        fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn colors(picture: &RgbImage) -> usize {
+    picture
+        .pixels()
+        .collect::<std::collections::HashSet<_>>()
+        .len()
+}
+
+/// Share of the pixels that differ.
+fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let differing = a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count();
+    differing as f64 / f64::from(a.width() * a.height())
+}
+
+const SMALL: &[&str] = &["--resolution", "320x240", "--spp", "4"];
+
+#[test]
+fn it_starts_shows_a_picture_and_control_q_ends_it() {
+    let Some(desktop) = desktop("start") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.wait_until_done(&mut program);
+    assert_eq!(desktop.size(&program), (320, 240));
+    assert!(
+        colors(&desktop.shot(&program)) > 50,
+        "the window shows next to nothing"
+    );
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+}
+
+#[test]
+fn closing_the_window_ends_it_also_while_it_works() {
+    let Some(desktop) = desktop("close") else {
+        return;
+    };
+    if desktop.manager.is_none() {
+        println!("SKIPPED closing the window: no window manager is installed");
+        return;
+    }
+    let mut program = desktop.start(&["--resolution", "640x480", "--spp", "100000"]);
+    pause(1000);
+    let start = Instant::now();
+    desktop
+        .command("wmctrl")
+        .args(["-i", "-c", &program.window])
+        .status()
+        .unwrap();
+    assert_eq!(program.wait().code(), Some(0));
+    assert!(
+        start.elapsed() < Duration::from_secs(5),
+        "{:?}",
+        start.elapsed()
+    );
+}
+
+#[test]
+fn w_moves_the_picture_and_silence_leaves_it() {
+    let Some(desktop) = desktop("fly") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.hide_status(&mut program);
+    let before = desktop.shot(&program);
+    pause(500);
+    assert_eq!(
+        difference(&before, &desktop.shot(&program)),
+        0.0,
+        "the picture moves by itself"
+    );
+    desktop.xdotool(["keydown", "w"]);
+    pause(400);
+    desktop.xdotool(["keyup", "w"]);
+    pause(100);
+    desktop.wait_until_done(&mut program);
+    let after = desktop.shot(&program);
+    assert!(
+        difference(&before, &after) > 0.05,
+        "{}",
+        difference(&before, &after)
+    );
+    // And back again.
+    desktop.xdotool(["key", "Return"]);
+    pause(100);
+    desktop.wait_until_done(&mut program);
+    assert_eq!(
+        difference(&before, &desktop.shot(&program)),
+        0.0,
+        "Enter does not bring the camera back"
+    );
+}
+
+#[test]
+fn a_key_that_is_down_when_the_focus_goes_is_let_go() {
+    let Some(desktop) = desktop("focus") else {
+        return;
+    };
+    if desktop.manager.is_none() {
+        println!("SKIPPED losing the focus: no window manager is installed");
+        return;
+    }
+    let mut program = desktop.start(SMALL);
+    desktop.wait_until_done(&mut program);
+    desktop.xdotool(["keydown", "w"]);
+    pause(200);
+    desktop.xdotool(["windowminimize", &program.window]);
+    pause(300);
+    desktop.xdotool(["keyup", "w"]);
+    desktop.focus(&program);
+    // If it still flew, it would never be done.
+    desktop.wait_until_done(&mut program);
+}
+
+#[test]
+fn it_survives_storms_of_resizes() {
+    let Some(desktop) = desktop("resize") else {
+        return;
+    };
+    let mut program = desktop.start(&["--resolution", "320x240", "--spp", "1000000"]);
+    for (count, interval, smallest) in [(400, "0.005", 40), (200, "0.020", 200), (100, "0.005", 1)]
+    {
+        let mut steps = Vec::new();
+        for i in 0..count {
+            let (width, height) = (smallest + i * 37 % 800, smallest + i * 53 % 500);
+            steps.extend([
+                "windowsize".to_owned(),
+                program.window.clone(),
+                width.to_string(),
+                height.to_string(),
+            ]);
+            steps.extend(["sleep".to_owned(), interval.to_owned()]);
+        }
+        desktop.xdotool(steps.iter().map(String::as_str));
+        assert!(
+            program.is_alive(),
+            "after {count} resizes, {interval} s apart"
+        );
+    }
+    desktop.xdotool(["windowsize", "--sync", &program.window, "333", "222"]);
+    // The picture follows, to its last row and column.
+    desktop.xdotool(["key", "z", "key", "z"]);
+    wait_for("a picture of the new size", || {
+        let shot = desktop.shot(&program);
+        let corner = image::imageops::crop_imm(&shot, 300, 190, 33, 32).to_image();
+        (shot.dimensions() == (333, 222) && colors(&corner) > 2).then_some(())
+    });
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+}
+
+#[test]
+fn it_survives_full_screen_and_minimising() {
+    let Some(desktop) = desktop("full-screen") else {
+        return;
+    };
+    if desktop.manager.is_none() {
+        println!("SKIPPED full screen and minimising: no window manager is installed");
+        return;
+    }
+    let mut program = desktop.start(SMALL);
+    desktop.wait_until_done(&mut program);
+    let before = desktop.shot(&program);
+    for _ in 0..3 {
+        desktop.xdotool(["key", "F11"]);
+        wait_for("full screen", || {
+            (desktop.size(&program) == (1280, 800)).then_some(())
+        });
+        desktop.xdotool(["key", "F11"]);
+        wait_for("the window", || {
+            (desktop.size(&program) == (320, 240)).then_some(())
+        });
+    }
+    for _ in 0..3 {
+        desktop.xdotool(["windowminimize", &program.window]);
+        pause(300);
+        desktop.focus(&program);
+        pause(300);
+    }
+    desktop.xdotool(["key", "r"]);
+    pause(100);
+    desktop.wait_until_done(&mut program);
+    let after = desktop.shot(&program);
+    // The status lines tell other numbers.
+    assert!(
+        difference(&before, &after) < 0.1,
+        "{}",
+        difference(&before, &after)
+    );
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+}
+
+#[test]
+fn a_finished_picture_costs_no_cpu_time() {
+    let Some(desktop) = desktop("idle") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.wait_until_done(&mut program);
+    pause(500);
+    let before = program.ticks();
+    pause(2000);
+    let ticks = program.ticks() - before;
+    assert!(
+        ticks < 4,
+        "{} % CPU at rest",
+        ticks as f64 * 10.0 / 2000.0 * 100.0
+    );
+}
+
+#[test]
+fn screenshots_are_what_the_window_shows() {
+    let Some(desktop) = desktop("screenshot") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.wait_until_done(&mut program);
+    let with_text = desktop.shot(&program);
+    let saved = |key: &str, count: usize| {
+        desktop.xdotool(["key", key]);
+        wait_for("the file", || {
+            let files = pictures_in(&desktop.directory);
+            (files.len() == count)
+                .then(|| files.last().cloned())
+                .flatten()
+        })
+    };
+    let first = saved("F12", 1);
+    // The notice that it was saved must go.
+    pause(7000);
+    desktop.hide_status(&mut program);
+    let without_text = desktop.shot(&program);
+    let second = saved("ctrl+F12", 2);
+    desktop.xdotool(["key", "ctrl+q"]);
+    // Files are complete when the program has ended.
+    assert_eq!(program.wait().code(), Some(0));
+    assert_eq!(image::open(first).unwrap().to_rgb8(), with_text);
+    assert_eq!(image::open(second).unwrap().to_rgb8(), without_text);
+    assert!(difference(&with_text, &without_text) > 0.01);
+    // To be added with the headless `render`: `penumbra render` of the same scene, resolution and
+    // samples per pixel gives the same file as Ctrl+F12, bit for bit.
+}
+
+/// In the order of their numbers (up to nine).
+fn pictures_in(directory: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = entries
+        .filter(|path| path.extension().is_some_and(|e| e == "png"))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn keys_that_change_nothing_of_the_light_keep_the_samples() {
+    let Some(desktop) = desktop("display") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.hide_status(&mut program);
+    let before = desktop.shot(&program);
+    desktop.xdotool(["key", "shift+period"]);
+    pause(500);
+    assert!(
+        desktop.title(&program).ends_with("- done"),
+        "exposure restarts the accumulation"
+    );
+    assert!(
+        difference(&before, &desktop.shot(&program)) > 0.05,
+        "exposure does nothing"
+    );
+    desktop.xdotool(["key", "shift+comma"]);
+    pause(500);
+    assert_eq!(
+        difference(&before, &desktop.shot(&program)),
+        0.0,
+        "a stop up and down again is nothing"
+    );
+}
+
+#[test]
+fn a_wrong_wayland_display_falls_back_to_x11() {
+    let Some(desktop) = desktop("wayland") else {
+        return;
+    };
+    let mut program = desktop.start_with(SMALL, &[("WAYLAND_DISPLAY", "wayland-nowhere")]);
+    desktop.wait_until_done(&mut program);
+}
