@@ -8,6 +8,8 @@ use penumbra::image::PictureFormat;
 use penumbra::image::compare::compare_files;
 use penumbra::load::{LoadReport, built_in_scenes};
 use penumbra::open::OpenError;
+#[cfg(feature = "view")]
+use penumbra::{open::open, trace::RenderSettings};
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -15,6 +17,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+/// Where the window comes to rest, if nobody says.
+#[cfg(feature = "view")]
+const WINDOW_SAMPLES: u32 = 1024;
 
 /// Documented in the README and in `--help`.
 mod exit {
@@ -51,7 +57,46 @@ fn window(args: &WindowArgs) -> u8 {
 
 #[cfg(feature = "view")]
 fn window(args: &WindowArgs) -> u8 {
-    instead_of_window(args)
+    use penumbra::view::{ViewError, ViewOptions, run};
+    let source = match args.scene.source() {
+        Ok(source) => source,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::SCENE_NOT_READABLE;
+        }
+    };
+    set_threads(args.scene.threads);
+    let wishes = args.scene.wishes(&args.output);
+    let options = ViewOptions {
+        title: format!("Penumbra – {}", source.name()),
+        size: wishes.size.unwrap_or(RenderSettings::default().size),
+        sample_target: wishes.samples.unwrap_or(WINDOW_SAMPLES),
+        screenshot_stem: source.name(),
+        exit_after: None,
+    };
+    let load = args.scene.load_options();
+    let opened = run(options, move || match open(&source, &load, &wishes) {
+        Ok(opened) => {
+            tell(&opened.report);
+            Ok(opened.app)
+        }
+        Err(error) => Err(error.to_string()),
+    });
+    match opened {
+        Ok(()) => 0,
+        Err(ViewError::NoDisplay(why)) => {
+            eprintln!("no window: {why}; rendering to a picture instead");
+            instead_of_window(args)
+        }
+        Err(ViewError::Scene(error)) => {
+            eprintln!("error: {error}");
+            exit::SCENE_NOT_READABLE
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            exit::FAILED
+        }
+    }
 }
 
 /// Renders what the window would have shown to `SCENE.png` in the current folder.

@@ -41,13 +41,6 @@ const SLACK: f32 = 12.0 / (1 << 24) as f32;
 /// A hit nearer than this part of the farthest corner's distance is measured again in double precision.
 const CANCELLATION: f32 = 0.25;
 
-/// The next float in the direction of `side` in each axis: far from the world's origin a sum with
-/// something small may round to nothing.
-fn beyond(point: Vec3, side: Vec3) -> Vec3 {
-    let next = |p: f32, side: f32| if side > 0.0 { p.next_up() } else { p.next_down() };
-    Vec3::new(next(point.x, side.x), next(point.y, side.y), next(point.z, side.z))
-}
-
 impl Probe {
     /// Prepares `ray` for boxes and triangles inside `bounds`.
     #[must_use]
@@ -67,7 +60,9 @@ impl Probe {
         let shear = Vec3::new(direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]);
 
         let reach = (bounds.min - ray.origin).abs().max((bounds.max - ray.origin).abs());
-        let slack = (reach + reach[z]) * (SLACK * factor);
+        // Two steps of the origin's own floats more: far from the world's origin a small sum rounds to nothing.
+        let step = ray.origin.abs() * (2.0 * f32::EPSILON) + f32::MIN_POSITIVE;
+        let slack = (reach + reach[z]) * (SLACK * factor) + step;
         let outward = Vec3::ONE.copysign(direction);
         let inverse = direction.map(|d| (1.0 / d).clamp(-f32::MAX, f32::MAX));
         Self {
@@ -76,8 +71,8 @@ impl Probe {
             axes: [x, y, z],
             shear,
             inverse,
-            near_origin: beyond(ray.origin + outward * slack, outward),
-            far_origin: beyond(ray.origin - outward * slack, -outward),
+            near_origin: ray.origin + outward * slack,
+            far_origin: ray.origin - outward * slack,
         }
     }
 

@@ -13,7 +13,9 @@ pub struct Viewpoint {
     right: Vec3,
     up: Vec3,
     back: Vec3,
-    projection: Projection,
+    /// Half the picture's height: at unit distance if in perspective, else in scene units.
+    half_height: f32,
+    perspective: bool,
 }
 
 impl Default for Viewpoint {
@@ -37,7 +39,11 @@ impl Viewpoint {
             right: right.as_vec3(),
             up: up.as_vec3(),
             back: back.as_vec3(),
-            projection,
+            half_height: match projection {
+                Projection::Perspective { vertical_fov } => (0.5 * vertical_fov).tan(),
+                Projection::Orthographic { height } => 0.5 * height,
+            },
+            perspective: matches!(projection, Projection::Perspective { .. }),
         }
     }
 
@@ -48,16 +54,11 @@ impl Viewpoint {
         // In units of half the picture's height, up positive.
         let x = (2.0 * point.x - size.x) / size.y;
         let y = 1.0 - 2.0 * point.y / size.y;
-        match self.projection {
-            Projection::Perspective { vertical_fov } => {
-                let k = (0.5 * vertical_fov).tan();
-                let direction = (self.right * (x * k) + self.up * (y * k) - self.back).normalize();
-                Ray::new(self.origin, direction)
-            }
-            Projection::Orthographic { height } => {
-                let offset = (self.right * x + self.up * y) * (0.5 * height);
-                Ray::new(self.origin + offset, -self.back)
-            }
+        let offset = (self.right * x + self.up * y) * self.half_height;
+        if self.perspective {
+            Ray::new(self.origin, (offset - self.back).normalize())
+        } else {
+            Ray::new(self.origin + offset, -self.back)
         }
     }
 }
