@@ -3,8 +3,8 @@
 use super::settings::SidecarRender;
 use bevy_ecs::prelude::*;
 
-/// More warnings than this are only counted.
-const MOST_WARNINGS: usize = 100;
+/// More warnings than this are only counted, more decisions not told.
+const MOST_LINES: usize = 100;
 
 /// What [`super::load`] found and did.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +52,7 @@ impl<'w> Sink<'w> {
         if self.report.warnings.contains(&line) {
             return;
         }
-        if self.report.warnings.len() < MOST_WARNINGS {
+        if self.report.warnings.len() < MOST_LINES {
             self.report.warnings.push(line);
         } else {
             self.unsaid += 1;
@@ -61,7 +61,8 @@ impl<'w> Sink<'w> {
 
     /// Adds a decision, once.
     pub(super) fn decide(&mut self, line: String) {
-        if !self.report.decisions.contains(&line) {
+        let has_room = self.report.decisions.len() < MOST_LINES;
+        if has_room && !self.report.decisions.contains(&line) {
             self.report.decisions.push(line);
         }
     }

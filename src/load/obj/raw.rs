@@ -4,7 +4,7 @@ use super::lines::Statement;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use glam::{Vec2, Vec3};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 /// Stands for "no index given".
 pub(super) const NONE: u32 = u32::MAX;
@@ -39,6 +39,8 @@ pub(super) struct Raw {
     /// Names that faces use; None for faces before the first `usemtl`.
     pub(super) materials: Vec<Option<String>>,
     pub(super) libraries: Vec<String>,
+    /// By name the index in `materials`.
+    slots: HashMap<Option<String>, u16>,
     /// Of the faces to come.
     material: Option<String>,
     slot: Option<u16>,
@@ -156,15 +158,16 @@ impl Raw {
     }
 
     fn current_slot(&mut self) -> Result<u16, String> {
-        let known = self
-            .materials
-            .iter()
-            .position(|name| *name == self.material);
-        let slot = known.unwrap_or_else(|| {
-            self.materials.push(self.material.clone());
-            self.materials.len() - 1
-        });
-        let slot = u16::try_from(slot).map_err(|_| "more than 65536 materials".to_owned())?;
+        let slot = match self.slots.get(&self.material) {
+            Some(&known) => known,
+            None => {
+                let new = u16::try_from(self.materials.len());
+                let new = new.map_err(|_| "more than 65536 materials".to_owned())?;
+                self.materials.push(self.material.clone());
+                self.slots.insert(self.material.clone(), new);
+                new
+            }
+        };
         self.slot = Some(slot);
         Ok(slot)
     }
