@@ -145,7 +145,7 @@ def outward(points, triangles):
 
 # ---- the bust: an owl, 968 triangles --------------------------------------------------------------
 
-EYES = [(-0.34, 1.32, 0.56), (0.34, 1.32, 0.56)]
+EYES = [(-0.32, 1.34, 0.47), (0.32, 1.34, 0.47)]
 
 
 def owl_body(t, angle):
@@ -175,10 +175,10 @@ def bust():
     parts = [("body", "feather", ball(24, 15, owl_body))]
     for eye in EYES:
         parts.append(("eye", "eye", ball(12, 6, lambda t, a, e=eye: (
-            e[0] + 0.2 * sphere_point(t, a)[0], e[1] + 0.2 * sphere_point(t, a)[2], e[2] + 0.2 * sphere_point(t, a)[1]))))
+            e[0] + 0.23 * sphere_point(t, a)[0], e[1] + 0.23 * sphere_point(t, a)[2], e[2] + 0.23 * sphere_point(t, a)[1]))))
     for side in (-1, 1):
-        parts.append(("ear", "feather", cone(8, 1, (0.72 * side, 2.3, 0.12), (0.47 * side, 1.68, 0.08), 0.2, True)))
-    parts.append(("beak", "beak", cone(8, 2, (0.0, 0.93, 0.98), (0.0, 1.22, 0.56), 0.13, False)))
+        parts.append(("ear", "feather", cone(8, 1, (0.7 * side, 2.15, 0.1), (0.45 * side, 1.62, 0.08), 0.24, True)))
+    parts.append(("beak", "beak", cone(8, 2, (0.0, 0.96, 0.92), (0.0, 1.26, 0.5), 0.15, False)))
     for name, material, (points, triangles) in parts:
         triangles = outward(points, triangles)
         normals = smooth(points, triangles)
@@ -188,7 +188,7 @@ def bust():
         for triangle in triangles:
             if name == "eye":
                 middle = max(points[i][2] for i in triangle) - max(p[2] for p in points)
-                wanted = "pupil" if middle > -0.02 else "eye"
+                wanted = "pupil" if middle > -0.03 else "eye"
                 if wanted != current:
                     obj.use(wanted)
                     current = wanted

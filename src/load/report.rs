@@ -3,8 +3,8 @@
 use super::settings::SidecarRender;
 use bevy_ecs::prelude::*;
 
-/// More warnings than this are only counted.
-const MOST_WARNINGS: usize = 100;
+/// More warnings than this are only counted, more decisions not told.
+const MOST_LINES: usize = 100;
 
 /// What [`super::load`] found and did.
 #[derive(Clone, Debug, Default)]
@@ -32,7 +32,12 @@ pub(super) struct Sink<'w> {
 
 impl<'w> Sink<'w> {
     pub(super) fn new(world: &'w mut World) -> Self {
-        Self { world, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
+        Self {
+            world,
+            report: LoadReport::default(),
+            spawned: Vec::new(),
+            unsaid: 0,
+        }
     }
 
     /// Spawns, so that [`Sink::undo`] can take it back.
@@ -47,7 +52,7 @@ impl<'w> Sink<'w> {
         if self.report.warnings.contains(&line) {
             return;
         }
-        if self.report.warnings.len() < MOST_WARNINGS {
+        if self.report.warnings.len() < MOST_LINES {
             self.report.warnings.push(line);
         } else {
             self.unsaid += 1;
@@ -56,7 +61,8 @@ impl<'w> Sink<'w> {
 
     /// Adds a decision, once.
     pub(super) fn decide(&mut self, line: String) {
-        if !self.report.decisions.contains(&line) {
+        let has_room = self.report.decisions.len() < MOST_LINES;
+        if has_room && !self.report.decisions.contains(&line) {
             self.report.decisions.push(line);
         }
     }
@@ -77,7 +83,9 @@ impl<'w> Sink<'w> {
     /// The finished report.
     pub(super) fn finish(mut self) -> LoadReport {
         if self.unsaid > 0 {
-            self.report.warnings.push(format!("... and {} more warnings", self.unsaid));
+            self.report
+                .warnings
+                .push(format!("... and {} more warnings", self.unsaid));
         }
         self.report
     }

@@ -12,10 +12,16 @@ pub(super) struct Buffer<'a> {
 }
 
 /// Gets all buffers.
-pub(super) fn read_all<'a>(root: &Root, folder: &Folder, binary: Option<&'a [u8]>) -> Vec<Buffer<'a>> {
+pub(super) fn read_all<'a>(
+    root: &Root,
+    folder: &Folder,
+    binary: Option<&'a [u8]>,
+) -> Vec<Buffer<'a>> {
     let one = |(i, buffer): (usize, &gltf::json::Buffer)| {
         let data = match (&buffer.uri, binary) {
-            (Some(uri), _) => read_uri(folder, uri, SCENE_LIMIT).map_err(|why| format!("{}: {why}", shorten(uri))),
+            (Some(uri), _) => {
+                read_uri(folder, uri, SCENE_LIMIT).map_err(|why| format!("{}: {why}", shorten(uri)))
+            }
             (None, Some(binary)) if i == 0 => Ok(Cow::Borrowed(binary)),
             (None, _) => Err("neither a URI nor a binary chunk holds its data".to_owned()),
         };
@@ -24,7 +30,10 @@ pub(super) fn read_all<'a>(root: &Root, folder: &Folder, binary: Option<&'a [u8]
             if data.len() as u64 >= wanted {
                 Ok(data)
             } else {
-                Err(format!("too short: byteLength is {wanted}, the data has {} bytes", data.len()))
+                Err(format!(
+                    "too short: byteLength is {wanted}, the data has {} bytes",
+                    data.len()
+                ))
             }
         });
         Buffer { data: checked }
@@ -52,17 +61,28 @@ pub(super) fn shorten(uri: &str) -> String {
     }
     let decoded = percent_decoded(uri);
     let text = String::from_utf8_lossy(&decoded);
-    if text.chars().count() > 120 { text.chars().take(120).chain("...".chars()).collect() } else { text.into_owned() }
+    if text.chars().count() > 120 {
+        text.chars().take(120).chain("...".chars()).collect()
+    } else {
+        text.into_owned()
+    }
 }
 
 impl<'a> Document<'a> {
     /// The bytes of a buffer view and its stride.
-    pub(super) fn view(&self, index: &Index<View>, user: &str) -> Result<(&[u8], Option<usize>), LoadError> {
+    pub(super) fn view(
+        &self,
+        index: &Index<View>,
+        user: &str,
+    ) -> Result<(&[u8], Option<usize>), LoadError> {
         let view = self.at(&self.root.buffer_views, index, "buffer view", user)?;
         let place = || format!("buffer view {}", index.value());
         self.at(&self.root.buffers, &view.buffer, "buffer", &place())?;
         let buffer = &self.buffers[view.buffer.value()];
-        let data = buffer.data.as_ref().map_err(|why| self.broken(format!("buffer {}", view.buffer.value()), why))?;
+        let data = buffer
+            .data
+            .as_ref()
+            .map_err(|why| self.broken(format!("buffer {}", view.buffer.value()), why))?;
         let offset = view.byte_offset.map_or(0, |offset| offset.0);
         let range = offset.checked_add(view.byte_length.0).and_then(|end| {
             let (start, end) = (usize::try_from(offset).ok()?, usize::try_from(end).ok()?);
@@ -71,15 +91,25 @@ impl<'a> Document<'a> {
         let bytes = range.ok_or_else(|| {
             let length = view.byte_length.0;
             let size = data.len();
-            self.broken(place(), format!("out of bounds: offset {offset} + length {length} in a buffer of {size} bytes"))
+            self.broken(
+                place(),
+                format!(
+                    "out of bounds: offset {offset} + length {length} in a buffer of {size} bytes"
+                ),
+            )
         })?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
     }
 }
 
 fn decode_data(data: &str) -> Result<Vec<u8>, ReadError> {
-    let (head, body) = data.split_once(',').ok_or(ReadError::Data("data URI without a comma"))?;
-    if head.split(';').any(|word| word.eq_ignore_ascii_case("base64")) {
+    let (head, body) = data
+        .split_once(',')
+        .ok_or(ReadError::Data("data URI without a comma"))?;
+    if head
+        .split(';')
+        .any(|word| word.eq_ignore_ascii_case("base64"))
+    {
         decode_base64(body).ok_or(ReadError::Data("data URI is not valid base64"))
     } else {
         Ok(percent_decoded(body))
@@ -91,7 +121,12 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let (mut pending, mut bits) = (0_u32, 0_u32);
     let digits = text.bytes().filter(|byte| !byte.is_ascii_whitespace());
-    let padding = text.trim_end().bytes().rev().take_while(|&byte| byte == b'=').count();
+    let padding = text
+        .trim_end()
+        .bytes()
+        .rev()
+        .take_while(|&byte| byte == b'=')
+        .count();
     let count = digits.clone().count().checked_sub(padding)?;
     if padding > 2 || count % 4 == 1 {
         return None;
@@ -141,8 +176,14 @@ mod tests {
 
     #[test]
     fn base64_is_read_with_and_without_padding() {
-        assert_eq!(decode_base64("aGFsbG8=").as_deref(), Some(b"hallo".as_slice()));
-        assert_eq!(decode_base64("aGFs\nbG8").as_deref(), Some(b"hallo".as_slice()));
+        assert_eq!(
+            decode_base64("aGFsbG8=").as_deref(),
+            Some(b"hallo".as_slice())
+        );
+        assert_eq!(
+            decode_base64("aGFs\nbG8").as_deref(),
+            Some(b"hallo".as_slice())
+        );
         assert_eq!(decode_base64("aGFsbG8*"), None);
         assert_eq!(decode_base64("a"), None);
         assert_eq!(decode_base64("a="), None);

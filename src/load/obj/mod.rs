@@ -14,8 +14,10 @@
 
 mod assemble;
 mod lines;
+mod map;
 mod mtl;
 mod polygon;
+mod raw;
 
 use super::error::LoadError;
 use super::geometry;
@@ -25,13 +27,9 @@ use super::source::{Bytes, Folder};
 use crate::scene::{Instance, Material, Mesh};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use glam::{Vec2, Vec3};
-use lines::Statement;
-use std::collections::{BTreeMap, BTreeSet};
+use raw::Raw;
+use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Stands for "no index given".
-const NONE: u32 = u32::MAX;
 
 /// Reads `bytes` and puts mesh and materials on `root`.
 pub(super) fn load(
@@ -53,8 +51,11 @@ pub(super) fn load(
         Some(_) => BTreeMap::new(),
         None => mtl::spawn_all(file, folder, &raw.libraries, overrides, sink),
     };
-    let materials: Vec<Entity> =
-        raw.materials.iter().map(|name| material_entity(file, name.as_deref(), &library, overrides, sink)).collect();
+    let materials: Vec<Entity> = raw
+        .materials
+        .iter()
+        .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
+        .collect();
     let done = geometry::finish(assemble::mesh(&raw));
     for line in done.mended.lines() {
         sink.warn(format!("{file}: {line}"));
@@ -62,7 +63,9 @@ pub(super) fn load(
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
-        sink.world.entity_mut(root).insert(Instance { mesh, materials });
+        sink.world
+            .entity_mut(root)
+            .insert(Instance { mesh, materials });
     }
     Ok(())
 }
@@ -79,7 +82,9 @@ fn material_entity(
         return all;
     }
     let Some(name) = name else {
-        sink.decide(format!("{file}: surfaces without a material are light grey"));
+        sink.decide(format!(
+            "{file}: surfaces without a material are light grey"
+        ));
         return sink.spawn((Name::new("default"), Material::default()));
     };
     if let Some(&known) = library.get(name) {
@@ -90,254 +95,17 @@ fn material_entity(
     }
     let short: String = name.chars().take(80).collect();
     let lower = name.to_lowercase();
-    if let Some((other, &entity)) = library.iter().find(|(other, _)| other.to_lowercase() == lower) {
-        sink.warn(format!("{file}: material `{short}` is defined as `{other}`"));
+    if let Some((other, &entity)) = library
+        .iter()
+        .find(|(other, _)| other.to_lowercase() == lower)
+    {
+        sink.warn(format!(
+            "{file}: material `{short}` is defined as `{other}`"
+        ));
         return entity;
     }
-    sink.warn(format!("{file}: material `{short}` is not defined; light grey"));
+    sink.warn(format!(
+        "{file}: material `{short}` is not defined; light grey"
+    ));
     sink.spawn((Name::new(short), Material::default()))
-}
-
-/// One corner of a face: indices of position, texture coordinates and normal, or [`NONE`].
-#[derive(Clone, Copy)]
-struct Corner {
-    position: u32,
-    uv: u32,
-    normal: u32,
-}
-
-/// One face as it stands in the file.
-struct Face {
-    /// Its corners begin here in [`Raw::corners`] and end where the next face's begin.
-    first_corner: u32,
-    line: u32,
-    material: u16,
-    /// Smoothing group; 0 is off.
-    group: u32,
-}
-
-/// An OBJ file as it is written.
-#[derive(Default)]
-struct Raw {
-    positions: Vec<Vec3>,
-    /// Empty, or as long as `positions`.
-    colors: Vec<Vec3>,
-    uvs: Vec<Vec2>,
-    normals: Vec<Vec3>,
-    corners: Vec<Corner>,
-    faces: Vec<Face>,
-    /// Names that faces use; None for faces before the first `usemtl`.
-    materials: Vec<Option<String>>,
-    libraries: Vec<String>,
-    /// Of the faces to come.
-    material: Option<String>,
-    slot: Option<u16>,
-    group: u32,
-    short_faces: usize,
-    first_short_face: u32,
-    unknown: BTreeSet<String>,
-}
-
-impl Raw {
-    fn read(&mut self, file: &str, statement: &Statement<'_>) -> Result<(), LoadError> {
-        let broken = |problem: String| LoadError::broken(file, format!("line {}", statement.line), problem);
-        match statement.keyword {
-            "v" => self.read_position(statement.rest).map_err(broken)?,
-            "vt" => {
-                let ([u, v, _], count) = numbers::<3>(statement.rest).map_err(broken)?;
-                if count == 0 {
-                    return Err(broken("texture coordinate without numbers".to_owned()));
-                }
-                self.uvs.push(Vec2::new(u, 1.0 - v));
-            }
-            "vn" => match numbers::<3>(statement.rest).map_err(broken)? {
-                (normal, 3) => self.normals.push(Vec3::from(normal)),
-                (_, count) => return Err(broken(format!("normal of {count} numbers instead of 3"))),
-            },
-            "f" | "fo" => self.read_face(statement).map_err(broken)?,
-            "usemtl" => {
-                self.material = Some(statement.rest.to_owned());
-                self.slot = None;
-            }
-            "mtllib" => self.libraries.push(statement.rest.to_owned()),
-            "s" => self.group = statement.rest.parse().unwrap_or(0),
-            "g" | "o" | "vp" | "p" | "l" => {}
-            other => {
-                if self.unknown.len() < 8 {
-                    self.unknown.insert(other.chars().take(20).collect());
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn read_position(&mut self, text: &str) -> Result<(), String> {
-        let (values, count) = numbers::<7>(text)?;
-        if count < 3 {
-            return Err(format!("vertex of {count} coordinates instead of 3"));
-        }
-        self.positions.push(Vec3::new(values[0], values[1], values[2]));
-        // Six numbers end in a colour; seven have a weight before it.
-        let color = if count >= 6 { Some(Vec3::from_slice(&values[count - 3..count])) } else { None };
-        if color.is_some() && self.colors.is_empty() {
-            self.colors.resize(self.positions.len() - 1, Vec3::ONE);
-        }
-        if color.is_some() || !self.colors.is_empty() {
-            self.colors.push(color.unwrap_or(Vec3::ONE));
-        }
-        Ok(())
-    }
-
-    fn read_face(&mut self, statement: &Statement<'_>) -> Result<(), String> {
-        let first = self.corners.len();
-        for word in statement.rest.split_ascii_whitespace().take_while(|word| !word.starts_with('#')) {
-            let mut parts = word.split('/');
-            let mut index = |count: usize, what: &str| resolve(parts.next(), count, what);
-            let position = index(self.positions.len(), "vertex")?;
-            let uv = index(self.uvs.len(), "texture coordinate (vt)")?;
-            let normal = index(self.normals.len(), "normal (vn)")?;
-            if position == NONE {
-                return Err(format!("face corner `{}` without a vertex index", shorten(word)));
-            }
-            self.corners.push(Corner { position, uv, normal });
-        }
-        if self.corners.len() - first < 3 {
-            self.corners.truncate(first);
-            self.first_short_face = if self.short_faces == 0 { statement.line } else { self.first_short_face };
-            self.short_faces += 1;
-            return Ok(());
-        }
-        let first_corner = u32::try_from(first).map_err(|_| "more than 2^32 face corners".to_owned())?;
-        let material = match self.slot {
-            Some(slot) => slot,
-            None => self.current_slot()?,
-        };
-        self.faces.push(Face { first_corner, line: statement.line, material, group: self.group });
-        Ok(())
-    }
-
-    fn current_slot(&mut self) -> Result<u16, String> {
-        let known = self.materials.iter().position(|name| *name == self.material);
-        let slot = known.unwrap_or_else(|| {
-            self.materials.push(self.material.clone());
-            self.materials.len() - 1
-        });
-        let slot = u16::try_from(slot).map_err(|_| "more than 65536 materials".to_owned())?;
-        self.slot = Some(slot);
-        Ok(slot)
-    }
-
-    /// Corners of face `i`.
-    fn corners_of(&self, i: usize) -> &[Corner] {
-        let start = self.faces[i].first_corner as usize;
-        let end = self.faces.get(i + 1).map_or(self.corners.len(), |next| next.first_corner as usize);
-        &self.corners[start..end]
-    }
-
-    /// Indices into a list that the file does not have at all mean nothing.
-    fn forget_absent(&mut self, file: &str, sink: &mut Sink<'_>) {
-        let (no_uvs, no_normals) = (self.uvs.is_empty(), self.normals.is_empty());
-        let mut forgotten = 0;
-        for corner in &mut self.corners {
-            if no_uvs && corner.uv != NONE {
-                corner.uv = NONE;
-                forgotten += 1;
-            }
-            if no_normals && corner.normal != NONE {
-                corner.normal = NONE;
-                forgotten += 1;
-            }
-        }
-        if forgotten > 0 {
-            sink.warn(format!("{file}: {forgotten} indices of normals or texture coordinates ignored: the file has none"));
-        }
-    }
-
-    /// Faces may stand before their vertices, so indices are checked at the end.
-    fn check(&mut self, file: &str, sink: &mut Sink<'_>) -> Result<(), LoadError> {
-        self.forget_absent(file, sink);
-        for (i, face) in self.faces.iter().enumerate() {
-            for corner in self.corners_of(i) {
-                let lists = [
-                    (corner.position, self.positions.len(), "vertex"),
-                    (corner.uv, self.uvs.len(), "texture coordinate (vt)"),
-                    (corner.normal, self.normals.len(), "normal (vn)"),
-                ];
-                let position = self.positions.get(corner.position as usize);
-                if position.is_some_and(|p| p.is_nan()) {
-                    let problem = format!("uses vertex {}, which is not a finite number", corner.position + 1);
-                    return Err(LoadError::broken(file, format!("line {}", face.line), problem));
-                }
-                for (index, count, what) in lists {
-                    if index != NONE && index as usize >= count {
-                        let problem = format!("index out of range: {what} {} of {count}", u64::from(index) + 1);
-                        return Err(LoadError::broken(file, format!("line {}", face.line), problem));
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn warn(&self, file: &str, sink: &mut Sink<'_>) {
-        if self.short_faces > 0 {
-            let (count, line) = (self.short_faces, self.first_short_face);
-            sink.warn(format!("{file}: line {line}: {count} faces with fewer than three corners skipped"));
-        }
-        if !self.unknown.is_empty() {
-            let names: Vec<&str> = self.unknown.iter().map(String::as_str).collect();
-            sink.warn(format!("{file}: statements skipped: {}", names.join(", ")));
-        }
-        if self.faces.is_empty() {
-            sink.warn(format!("{file}: no faces in it: nothing to see"));
-        }
-    }
-}
-
-/// Up to `N` numbers; how many there were. Values that are not finite are allowed, here.
-fn numbers<const N: usize>(text: &str) -> Result<([f32; N], usize), String> {
-    let mut values = [0.0; N];
-    let mut count = 0;
-    for word in text.split_ascii_whitespace().take_while(|word| !word.starts_with('#')).take(N) {
-        values[count] = number(word).ok_or_else(|| format!("`{}` is not a number", shorten(word)))?;
-        count += 1;
-    }
-    Ok((values, count))
-}
-
-/// A number. What is spelled as not finite (`nan`, `inf`, `1.#IND` of old compilers) is NaN; what is
-/// too large is infinite.
-fn number(word: &str) -> Option<f32> {
-    let old = word.contains(".#IN") || word.contains(".#QNAN") || word.contains(".#SNAN");
-    if old {
-        return Some(f32::NAN);
-    }
-    let lower = || word.trim_start_matches(['+', '-']).to_ascii_lowercase();
-    let Ok(value) = word.parse::<f64>() else {
-        return (lower().starts_with("nan") || lower().starts_with("inf")).then_some(f32::NAN);
-    };
-    let is_spelled = !value.is_finite() && !word.contains(|c: char| c.is_ascii_digit());
-    Some(if is_spelled { f32::NAN } else { value as f32 })
-}
-
-/// Index from 0 of what a face names from 1, or from the end if negative.
-fn resolve(word: Option<&str>, count: usize, what: &str) -> Result<u32, String> {
-    let word = word.unwrap_or_default();
-    if word.is_empty() {
-        return Ok(NONE);
-    }
-    let out_of_range = || format!("index out of range: {what} {}, {count} so far", shorten(word));
-    match word.parse::<i64>() {
-        Ok(0) => Err(format!("index 0: {what} indices begin at 1")),
-        Ok(index) if index > 0 => u32::try_from(index - 1).ok().filter(|&i| i != NONE).ok_or_else(out_of_range),
-        Ok(index) => {
-            let from_end = usize::try_from(index.unsigned_abs()).ok().and_then(|back| count.checked_sub(back));
-            from_end.and_then(|i| u32::try_from(i).ok()).ok_or_else(out_of_range)
-        }
-        Err(error) => Err(format!("{what} index `{}` is not a number in range: {error}", shorten(word))),
-    }
-}
-
-fn shorten(word: &str) -> String {
-    word.chars().take(40).collect()
 }
