@@ -206,8 +206,12 @@ fn prepare(app: &mut App, sample_target: u32, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
     if !app.world.contains_resource::<FlySpeed>() {
-        let radius = app.world.get_resource::<SceneBounds>().map_or(2.0, |bounds| bounds.radius);
-        app.world.insert_resource(FlySpeed(RADII_PER_SECOND * radius));
+        let radius = app
+            .world
+            .get_resource::<SceneBounds>()
+            .map_or(2.0, |bounds| bounds.radius);
+        app.world
+            .insert_resource(FlySpeed(RADII_PER_SECOND * radius));
     }
     app.add_systems(
         (

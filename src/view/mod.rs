@@ -24,13 +24,13 @@ use winit::event_loop::{EventLoop, EventLoopBuilder};
 /// What the window is like.
 #[derive(Clone, Debug)]
 pub struct ViewOptions {
-    /// First words of the window's title, and of the text shown while the scene loads.
+    /// First words of the window's title.
     pub title: String,
     /// Size of the picture when the window opens, physical pixels.
     pub size: UVec2,
     /// Samples per pixel to stop at.
     pub sample_target: u32,
-    /// Screenshots are called `{screenshot_stem}_{n}.png`.
+    /// Name of the scene: screenshots are called `{screenshot_stem}_{n}.png`.
     pub screenshot_stem: String,
     /// Closes the window by itself after this time.
     pub exit_after: Option<Duration>,

@@ -266,7 +266,7 @@ impl Viewer {
         let loading = self
             .status
             .is_none()
-            .then(|| [format!("loading {} ...", self.options.title)]);
+            .then(|| [format!("loading {} ...", self.options.screenshot_stem)]);
         let outcome = screen.draw(|bytes, size| {
             if self.picture.rgba.is_empty() {
                 bytes
