@@ -12,6 +12,7 @@ use crate::trace::{
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy_ecs::system::ScheduleSystem;
+use glam::UVec2;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -122,6 +123,28 @@ impl App {
         let mut app = Self::new(settings);
         let report = load(&mut app.world, source, options)?;
         Ok((app, report))
+    }
+
+    /// Brings all that is derived from the entities up to date, without tracing.
+    pub fn build(&mut self) {
+        let target = std::mem::take(&mut self.world.resource_mut::<FrameBudget>().sample_target);
+        self.frame();
+        self.world.resource_mut::<FrameBudget>().sample_target = target;
+    }
+
+    /// A small picture of what the camera sees, apart from the film. Call [`App::build`] first.
+    #[must_use]
+    pub fn probe(&self, size: UVec2, samples: u32) -> Film {
+        let scene = TraceScene {
+            geometry: self.world.resource::<Geometry>(),
+            surfaces: self.world.resource::<Surfaces>(),
+            lights: self.world.resource::<Lights>(),
+            viewpoint: self.world.resource::<Viewpoint>(),
+            settings: self.world.resource::<RenderSettings>(),
+        };
+        let mut film = Film::new(size, 0);
+        trace_pass(&scene, &mut film, samples, samples, || true);
+        film
     }
 
     /// Adds systems to the frame, each in its set.

@@ -1,6 +1,7 @@
 //! Arguments and a file → a world ready to make frames. The window and `render` both start here.
 
 use crate::app::{App, FrameBudget};
+use crate::image::develop::suggest_exposure;
 use crate::image::{Display, ToneMap};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Projection, Transform};
@@ -70,12 +71,14 @@ pub enum OpenError {
 
 /// A world ready to make frames.
 pub struct Opened {
-    /// The world; nothing is built yet.
+    /// The world, everything built, nothing traced.
     pub app: App,
     /// What loading found and did.
     pub report: LoadReport,
     /// Seconds that loading took.
     pub load_seconds: f64,
+    /// Seconds of building the hierarchies and the other arrays, and of choosing the exposure.
+    pub build_seconds: f64,
     /// Samples per pixel to make, if anybody said.
     pub samples: Option<u32>,
 }
@@ -86,7 +89,7 @@ pub struct Opened {
 /// If the scene cannot be loaded or has no such camera.
 pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Result<Opened, OpenError> {
     let start = Instant::now();
-    let (mut app, report) = App::open(source, options, RenderSettings::default())?;
+    let (mut app, mut report) = App::open(source, options, RenderSettings::default())?;
     let file = &report.render;
     let default = RenderSettings::default();
     let settings = RenderSettings {
@@ -104,16 +107,37 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
         }),
     };
     let samples = wishes.samples.or(file.spp);
-    let exposure = wishes.exposure.or(file.exposure).unwrap_or_default();
+    let exposure = wishes.exposure.or(file.exposure);
     app.world.insert_resource(settings);
     app.world.insert_resource(Film::new(settings.size, wishes.first_sample));
-    app.world.insert_resource(Display { exposure, tone_map: wishes.tone_map.unwrap_or_default() });
+    let tone_map = wishes.tone_map.unwrap_or_default();
+    app.world.insert_resource(Display { exposure: exposure.unwrap_or_default(), tone_map });
     if let Some(samples) = samples {
         app.world.resource_mut::<FrameBudget>().sample_target = samples;
     }
     choose_camera(&mut app.world, &report, &source.name(), wishes)?;
-    Ok(Opened { app, report, load_seconds: start.elapsed().as_secs_f64(), samples })
+    let load_seconds = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    app.build();
+    if exposure.is_none() {
+        // Always of this size, so that the window and `render` agree.
+        match suggest_exposure(&app.probe(PROBE, PROBE_SAMPLES)) {
+            Some(0.0) => {}
+            Some(stops) => {
+                app.world.resource_mut::<Display>().exposure = stops;
+                report.decisions.push(format!("the picture would be far off: exposed by {stops:+.2} EV"));
+            }
+            None => report.warnings.push("no light reaches the camera: the picture is black".to_owned()),
+        }
+    }
+    let build_seconds = start.elapsed().as_secs_f64();
+    Ok(Opened { app, report, load_seconds, build_seconds, samples })
 }
+
+/// The picture that the exposure is chosen by.
+const PROBE: UVec2 = UVec2::new(96, 64);
+const PROBE_SAMPLES: u32 = 4;
 
 fn choose_camera(world: &mut World, report: &LoadReport, scene: &str, wishes: &Wishes) -> Result<(), OpenError> {
     if let Some(wanted) = &wishes.camera {

@@ -132,23 +132,18 @@ pub fn render(
     let start = Instant::now();
     let scene = open(&job.source, &job.load, &job.wishes)?;
     opened(&scene);
-    let Opened { mut app, report, load_seconds, samples } = scene;
+    let Opened { mut app, report, load_seconds, build_seconds, samples } = scene;
     let target = samples.unwrap_or(if job.time_limit.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
 
-    let build = Instant::now();
     app.world.insert_resource(FrameBudget {
-        sample_target: 0,
+        sample_target: target,
         interrupt: Arc::clone(&job.interrupt),
         ..FrameBudget::default()
     });
-    app.frame();
-    let build_seconds = build.elapsed().as_secs_f64();
-
     let tracing = Instant::now();
     let mut first_picture_seconds = None;
     let mut seconds_to_noise = None;
     let mut step = 1;
-    app.world.resource_mut::<FrameBudget>().sample_target = target;
     let interrupted = loop {
         let left = job.time_limit.map(|limit| limit.saturating_sub(tracing.elapsed()));
         if left.is_some_and(|left| left.is_zero()) {

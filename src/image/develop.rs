@@ -1,7 +1,7 @@
 //! Linear radiance → bytes on a screen: exposure, tone map, sRGB, dither. Never touches the film.
 
 use bevy_ecs::prelude::*;
-use crate::scene::color::srgb_from_linear;
+use crate::scene::color::{luminance, srgb_from_linear};
 use crate::trace::Film;
 use crate::trace::sampler::{hash, unit_float};
 use glam::{UVec2, Vec3};
@@ -48,6 +48,26 @@ impl ToneMap {
             Self::Neutral => neutral(color),
         }
     }
+}
+
+/// An exposure for a picture that is much too dark or too bright at 0 EV; `None` if it is all black.
+///
+/// The 90th percentile of the luminance of what is not black goes to 0.7, in thirds of a stop, if it
+/// lies outside of 0.15 to 2: a picture that is roughly right stays as its author made it.
+#[must_use]
+pub fn suggest_exposure(film: &Film) -> Option<f32> {
+    let size = film.size();
+    let mut lit: Vec<f32> = (0..size.y)
+        .flat_map(|y| (0..size.x).map(move |x| luminance(film.pixel(x, y).mean().as_vec3())))
+        .filter(|&l| l > 0.0)
+        .collect();
+    if lit.is_empty() {
+        return None;
+    }
+    let rank = (lit.len() - 1) * 9 / 10;
+    let bright = *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
+    let stops = (0.7 / bright).log2();
+    Some(if (0.15..=2.0).contains(&bright) { 0.0 } else { (stops * 3.0).round() / 3.0 })
 }
 
 /// The film as sRGB bytes, RGBA, rows from the top.

@@ -196,7 +196,8 @@ fn convert(
     let exponent = within(material.shininess.unwrap_or(0.0), 0.0, 1e6);
     let opacity = material
         .dissolve
-        .or_else(|| scalar(material, "Tr").map(|transparency| 1.0 - transparency));
+        // Some exporters write `Tr 1` for what is there; nobody makes a model that cannot be seen.
+        .or_else(|| scalar(material, "Tr").filter(|&transparency| transparency < 1.0).map(|transparency| 1.0 - transparency));
     let opacity = within(opacity.unwrap_or(1.0), 0.0, 1.0);
     let pbr = match (scalar(material, "Pr"), scalar(material, "Pm")) {
         (None, None) => None,
