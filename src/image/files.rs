@@ -86,8 +86,7 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
 /// Mean radiances, rows from the top.
 #[must_use]
 pub fn linear_pixels(film: &Film) -> Vec<Vec3> {
-    let size = film.size();
-    (0..size.y).flat_map(|y| (0..size.x).map(move |x| film.pixel(x, y).mean().as_vec3())).collect()
+    (0..film.size().y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean().as_vec3()).collect()
 }
 
 /// Writes beside `path` and renames, so that nobody ever sees half a file.

@@ -37,7 +37,9 @@ impl Sum {
     }
 
     fn value(self) -> f64 {
-        self.0 as f64 / (1u64 << Self::FRACTION_BITS) as f64
+        // Two conversions and a sum: the whole 128 bits at once are a library call.
+        let (high, low) = ((self.0 >> 64) as i64 as f64, self.0 as u64 as f64);
+        (high * (u64::MAX as f64) + low) / (1u64 << Self::FRACTION_BITS) as f64
     }
 }
 
@@ -178,6 +180,17 @@ impl Film {
         let across = self.size.x.div_ceil(TILE);
         let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
         if tile.stale { &EMPTY } else { &tile.pixels[(y % TILE * tile.size.x + x % TILE) as usize] }
+    }
+
+    /// The pixels of row `y`, from the left.
+    pub fn row(&self, y: u32) -> impl Iterator<Item = &Pixel> {
+        let across = self.size.x.div_ceil(TILE) as usize;
+        let tiles = &self.tiles[(y / TILE) as usize * across..][..across];
+        tiles.iter().flat_map(move |tile| {
+            let first = (y % TILE * tile.size.x) as usize;
+            let row = &tile.pixels[first..first + tile.size.x as usize];
+            row.iter().map(|pixel| if tile.stale { &EMPTY } else { pixel })
+        })
     }
 
     /// Samples that every pixel has.

@@ -19,8 +19,7 @@ pub fn relative_noise(film: &Film) -> Option<f64> {
     let size = film.size();
     let mut pixels = Vec::with_capacity(size.element_product() as usize);
     for y in 0..size.y {
-        for x in 0..size.x {
-            let pixel = film.pixel(x, y);
+        for pixel in film.row(y) {
             let (a, b) = (brightness(pixel.half_mean(0)?), brightness(pixel.half_mean(1)?));
             pixels.push((brightness(pixel.mean()), 0.5 * (a - b)));
         }

@@ -72,13 +72,15 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
 
 /// The second dimension of the Sobol' sequence (the first is the reversed bits of the index).
 fn sobol_1(index: u32) -> u32 {
-    // The generator matrix is Pascal's triangle modulo 2, so multiplying by it is five sweeps.
-    let mut x = index.reverse_bits();
+    // The generator matrix is Pascal's triangle modulo 2: bit j of the result, from the top, is the parity
+    // of all bits of the index whose number has those of j. Five sweeps, one for each bit of that number.
+    let mut x = index;
     x ^= x >> 16 & 0x0000_ffff;
     x ^= x >> 8 & 0x00ff_00ff;
     x ^= x >> 4 & 0x0f0f_0f0f;
     x ^= x >> 2 & 0x3333_3333;
-    x ^ x >> 1 & 0x5555_5555
+    x ^= x >> 1 & 0x5555_5555;
+    x.reverse_bits()
 }
 
 #[cfg(test)]

@@ -21,8 +21,8 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Refinement per frame while the view changes: short, for the next motion waits for it.
-const MOVING: Duration = Duration::from_millis(12);
+/// Refinement per frame while the view changes: none, the next preview is worth more than some tiles.
+const MOVING: Duration = Duration::ZERO;
 /// Refinement per frame at rest. Commands interrupt it, so it costs no latency.
 const RESTING: std::ops::RangeInclusive<Duration> =
     Duration::from_millis(30)..=Duration::from_millis(100);
