@@ -1,0 +1,220 @@
+//! The program as a user runs it: exit codes, messages, files.
+
+mod support;
+
+use image::GenericImageView;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn penumbra(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_penumbra"))
+        .args(arguments)
+        .current_dir(folder)
+        // No display, whatever the machine has.
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn run(test: &str, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = penumbra(&support::folder(test), arguments);
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+fn fresh(test: &str) -> PathBuf {
+    let folder = support::folder(test);
+    std::fs::remove_dir_all(&folder).unwrap();
+    support::folder(test)
+}
+
+#[test]
+fn a_render_writes_what_is_asked_for_and_says_what_it_did() {
+    let folder = fresh("render");
+    let arguments = ["render", "cornell", "-o", "a.png", "-o", "a.exr", "--spp", "4", "--resolution", "48x32", "--json"];
+    let output = penumbra(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&json["samples"], &json["width"], &json["height"]), (&4.0.into(), &48.into(), &32.into()));
+    assert_eq!(json["rays"]["camera"], 48 * 32 * 4);
+    for key in ["load_seconds", "build_seconds", "render_seconds", "first_picture_seconds", "noise"] {
+        assert!(json[key].as_f64().is_some_and(|x| x > 0.0), "{key} in {json}");
+    }
+    if cfg!(target_os = "linux") {
+        assert!(json["peak_memory_bytes"].as_u64().unwrap() > 1 << 20);
+    }
+    assert_eq!(image::open(folder.join("a.png")).unwrap().dimensions(), (48, 32));
+    let exr = image::open(folder.join("a.exr")).unwrap();
+    assert!(matches!(exr, image::DynamicImage::ImageRgb32F(_)) || matches!(exr, image::DynamicImage::ImageRgba32F(_)));
+    let left: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|f| f.unwrap().file_name()).collect();
+    assert_eq!(left.len(), 2, "no half-written files: {left:?}");
+}
+
+#[test]
+fn a_name_without_ending_means_both_files() {
+    let folder = fresh("both");
+    let output = penumbra(&folder, &["cornell", "-o", "picture", "--spp", "1", "--resolution", "8x8", "-q"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stderr.is_empty(), "quiet");
+    assert!(folder.join("picture.png").is_file() && folder.join("picture.exr").is_file());
+}
+
+#[test]
+fn without_a_display_the_picture_goes_to_a_file() {
+    let folder = fresh("display");
+    let output = penumbra(&folder, &["cornell-point", "--spp", "1", "--resolution", "16x16"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(folder.join("cornell-point.png").is_file(), "{said}");
+    if cfg!(all(feature = "view", target_os = "linux")) {
+        assert!(said.contains("no window") && said.contains("DISPLAY"), "{said}");
+    }
+}
+
+#[test]
+fn exit_codes_are_those_of_the_documentation() {
+    let folder = fresh("codes");
+    std::fs::write(folder.join("broken.glb"), b"glTF but not really").unwrap();
+    std::fs::write(folder.join("wrong.toml"), "[[light]]\nkind = \"sphere\"\nradius = -1\n").unwrap();
+    let needs = r#"{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
+        "extensionsUsed":["KHR_draco_mesh_compression"]}"#;
+    std::fs::write(folder.join("draco.gltf"), needs).unwrap();
+    let small = ["--spp", "1", "--resolution", "4x4"];
+    for (arguments, code, words) in [
+        (vec!["render", "nothing.glb", "-o", "a.png"], 3, vec!["nothing.glb"]),
+        (vec!["render", "broken.glb", "-o", "a.png"], 3, vec!["broken.glb"]),
+        (vec!["render", "draco.gltf", "-o", "a.png"], 3, vec!["draco.gltf", "KHR_draco_mesh_compression"]),
+        (vec!["render", "cornel", "-o", "a.png"], 3, vec!["cornel", "did you mean", "cornell"]),
+        (vec!["nothing.glb"], 3, vec!["nothing.glb"]),
+        (vec!["render", "cornell", "--scene-settings", "wrong.toml", "-o", "a.png"], 3, vec!["wrong.toml", "line"]),
+        (vec!["render", "cornell", "-o", "a.jpg"], 2, vec!["a.jpg", ".png", ".exr"]),
+        (vec!["render", "cornell", "--camera", "nobody", "-o", "a.png"], 2, vec!["nobody"]),
+        (vec!["render", "cornell", "--resolution", "0x0"], 2, vec!["0x0"]),
+        (vec!["render", "--sppp", "1"], 2, vec!["--spp"]),
+        (vec!["render", "cornell", "-o", "no/such/folder/a.png"], 1, vec!["no/such/folder/a.png"]),
+        (vec!["compare", "no.png", "no.exr"], 1, vec!["no.png"]),
+    ] {
+        let mut all = arguments.clone();
+        if code != 2 && arguments[0] == "render" {
+            all.extend(small);
+        }
+        let output = penumbra(&folder, &all);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{all:?}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{all:?} should say {word}: {said}");
+        }
+        assert!(!said.contains("panicked"), "{said}");
+        let errors = said.lines().filter(|line| line.starts_with("error")).count();
+        assert_eq!(errors, 1, "one line: {said}");
+    }
+}
+
+#[test]
+fn sample_ranges_are_the_samples_of_the_whole() {
+    let folder = fresh("ranges");
+    let picture = |name: &str, range: &[&str]| {
+        let mut arguments = vec!["render", "cornell", "--resolution", "24x16", "-q", "-o", name];
+        arguments.extend(range);
+        assert_eq!(penumbra(&folder, &arguments).status.code(), Some(0));
+        image::open(folder.join(name)).unwrap().into_rgb32f().into_raw()
+    };
+    let whole = picture("whole.exr", &["--spp", "12"]);
+    let first = picture("first.exr", &["--sample-range", "0..4"]);
+    let rest = picture("rest.exr", &["--sample-range", "4..12", "-t", "1"]);
+    assert_ne!(first, rest);
+    for ((whole, first), rest) in whole.iter().zip(&first).zip(&rest) {
+        let merged = (f64::from(*first) * 4.0 + f64::from(*rest) * 8.0) / 12.0;
+        assert!((merged - f64::from(*whole)).abs() <= 1e-6 * merged.max(1e-3), "{merged} {whole}");
+    }
+}
+
+#[test]
+fn a_time_limit_ends_the_render_with_a_picture() {
+    let folder = fresh("limit");
+    let arguments = ["render", "cornell", "-o", "a.exr", "--time-limit", "0.3", "--json", "-q"];
+    let output = penumbra(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "no target was set, so none was missed");
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["render_seconds"].as_f64().unwrap() < 3.0 && json["samples"].as_f64().unwrap() > 0.0, "{json}");
+    let output = penumbra(&folder, &["render", "cornell", "-o", "b.png", "--time-limit", "0.2", "--spp", "100000"]);
+    assert_eq!(output.status.code(), Some(4), "stopped before the target");
+    assert!(folder.join("b.png").is_file());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interruption_saves_what_there_is() {
+    let folder = fresh("interrupt");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_penumbra"))
+        .args(["render", "cornell", "-o", "half.png", "--spp", "1000000", "--json", "-q"])
+        .current_dir(&folder)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(130));
+    let json: Value = serde_json::from_reader(child.stdout.take().unwrap()).unwrap();
+    assert_eq!(json["interrupted"], true);
+    assert!(image::open(folder.join("half.png")).is_ok());
+}
+
+#[test]
+fn compare_measures_and_judges() {
+    let folder = fresh("compare");
+    for (name, spp) in [("rough.png", "2"), ("fine.exr", "32")] {
+        let arguments = ["render", "cornell", "--resolution", "32x32", "--exposure", "0", "-q", "-o", name, "--spp", spp];
+        assert_eq!(penumbra(&folder, &arguments).status.code(), Some(0));
+    }
+    let (code, out, _) = run("compare", &["compare", "fine.exr", "fine.exr", "--json"]);
+    let json: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((code, json["rmse"].as_f64()), (Some(0), Some(0.0)));
+    let (code, out, _) = run("compare", &["compare", "rough.png", "fine.exr"]);
+    assert_eq!(code, Some(0));
+    for word in ["RMSE", "relMSE", "max error"] {
+        assert!(out.contains(word), "{out}");
+    }
+    assert_eq!(run("compare", &["compare", "rough.png", "fine.exr", "--fail-above", "1e-9"]).0, Some(5));
+    assert_eq!(run("compare", &["compare", "rough.png", "fine.exr", "--fail-above", "100"]).0, Some(0));
+    let small = ["render", "cornell", "--resolution", "8x8", "-q", "-o", "small.png", "--spp", "1"];
+    assert_eq!(penumbra(&folder, &small).status.code(), Some(0));
+    let (code, _, said) = run("compare", &["compare", "small.png", "fine.exr"]);
+    assert!(code == Some(1) && said.contains("8x8") && said.contains("32x32"), "{said}");
+}
+
+#[test]
+fn built_in_scenes_are_listed_and_open() {
+    let (code, out, _) = run("list", &["--list-scenes"]);
+    assert_eq!(code, Some(0));
+    let names: Vec<&str> = out.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    for name in ["cornell", "cornell-point", "gallery", "checker", "mirrors", "bust"] {
+        assert!(names.contains(&name), "{name} in {out}");
+    }
+    for name in names {
+        let (code, out, said) = run("list", &["render", name, "--spp", "1", "--resolution", "32x18", "--json", "-q"]);
+        assert_eq!(code, Some(0), "{name}: {said}");
+        let json: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(json["dropped_samples"], 0, "{name}");
+        assert_eq!(json["warnings"].as_array().unwrap().len(), 0, "{name}: {json}");
+    }
+}
+
+#[test]
+fn camera_flags_move_the_camera() {
+    let (_, one, _) = run("camera", &["render", "bust", "--resolution", "24x24", "--spp", "2", "-q", "-o", "a.exr", "--json"]);
+    assert!(!one.is_empty());
+    let away = ["--camera-position", "0,1,-9", "--camera-focal-point", "0,1,-20", "--camera-view-angle", "30"];
+    let mut arguments = vec!["render", "bust", "--resolution", "24x24", "--spp", "2", "-q", "-o", "b.exr"];
+    arguments.extend(away);
+    assert_eq!(run("camera", &arguments).0, Some(0));
+    let folder = support::folder("camera");
+    let pixels = |name| image::open(folder.join(name)).unwrap().into_rgb32f().into_raw();
+    assert_ne!(pixels("a.exr"), pixels("b.exr"));
+}
