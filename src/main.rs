@@ -9,7 +9,7 @@ use penumbra::image::compare::compare_files;
 use penumbra::load::{LoadReport, built_in_scenes};
 use penumbra::open::OpenError;
 #[cfg(feature = "view")]
-use penumbra::{open::open, trace::RenderSettings};
+use penumbra::{app::FrameBudget, open::open, trace::RenderSettings};
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -70,14 +70,15 @@ fn window(args: &WindowArgs) -> u8 {
     let options = ViewOptions {
         title: format!("Penumbra – {}", source.name()),
         size: wishes.size.unwrap_or(RenderSettings::default().size),
-        sample_target: wishes.samples.unwrap_or(WINDOW_SAMPLES),
         screenshot_stem: source.name(),
         exit_after: None,
     };
     let load = args.scene.load_options();
     let opened = run(options, move || match open(&source, &load, &wishes) {
-        Ok(opened) => {
+        Ok(mut opened) => {
             tell(&opened.report);
+            let mut budget = opened.app.world.resource_mut::<FrameBudget>();
+            budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
             Ok(opened.app)
         }
         Err(error) => Err(error.to_string()),

@@ -70,8 +70,6 @@ pub struct Engine<W> {
     pub published: Arc<Mutex<Published>>,
     /// Makes the window look.
     pub wake: W,
-    /// Samples per pixel to stop at.
-    pub sample_target: u32,
 }
 
 /// Locks `mutex`, also after a thread panicked with it: what we share is whole at any time.
@@ -93,7 +91,7 @@ impl<W: Fn(Wake)> Engine<W> {
     }
 
     fn run_frames(&self, app: &mut App) {
-        prepare(app, self.sample_target, &self.interrupt);
+        prepare(app, &self.interrupt);
         let mut view_changed_at = Instant::now();
         let mut idle = false;
         loop {
@@ -189,9 +187,8 @@ impl<W: Fn(Wake)> Engine<W> {
 }
 
 /// Adds the window's resources and systems.
-fn prepare(app: &mut App, sample_target: u32, interrupt: &Arc<AtomicBool>) {
+fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     let mut budget = app.world.resource_mut::<FrameBudget>();
-    budget.sample_target = sample_target;
     budget.interrupt = Arc::clone(interrupt);
     budget.preview = true;
     // The camera may be asked for its place before the first frame has run.

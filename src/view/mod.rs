@@ -28,8 +28,6 @@ pub struct ViewOptions {
     pub title: String,
     /// Size of the picture when the window opens, physical pixels.
     pub size: UVec2,
-    /// Samples per pixel to stop at.
-    pub sample_target: u32,
     /// Name of the scene: screenshots are called `{screenshot_stem}_{n}.png`.
     pub screenshot_stem: String,
     /// Closes the window by itself after this time.

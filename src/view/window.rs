@@ -177,7 +177,6 @@ impl Viewer {
             published: Arc::clone(&published),
             // The event loop is gone: so is who would look.
             wake: move |wake| drop(proxy.send_event(wake)),
-            sample_target: self.options.sample_target,
         };
         let thread = std::thread::Builder::new()
             .name("engine".to_owned())

@@ -53,7 +53,7 @@
 //!
 //! [render]
 //! integrator = "path"          # or "direct"
-//! max_depth = 8
+//! max_depth = 8                # bounces; 1 = direct light
 //! spp = 64                     # samples per pixel
 //! exposure = 0.0               # EV
 //! resolution = [640, 480]
@@ -84,7 +84,7 @@ use toml::Spanned;
 pub struct SidecarRender {
     /// How light is followed.
     pub integrator: Option<SidecarIntegrator>,
-    /// Most bounces, at least 1.
+    /// Most bounces; 0 shows only what shines.
     pub max_depth: Option<u32>,
     /// Samples per pixel, at least 1.
     pub spp: Option<u32>,
@@ -217,7 +217,6 @@ impl Settings {
         let render = table.get_ref();
         let wrong = |problem: &str| Err(self.broken(table, "[render]", problem));
         match render {
-            _ if render.max_depth == Some(0) => wrong("max_depth must be at least 1"),
             _ if render.spp == Some(0) => wrong("spp must be at least 1"),
             _ if render
                 .exposure
