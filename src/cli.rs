@@ -62,7 +62,8 @@ pub struct RenderArgs {
 /// Where a headless render goes and when it ends.
 #[derive(Debug, Args)]
 pub struct OutputArgs {
-    /// File to write: .png (developed) or .exr (linear); may be given several times
+    /// File to write: .png (developed) or .exr (linear); may be given several times [default: SCENE.png,
+    /// or nothing with --json]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
     /// Stop tracing after this many seconds

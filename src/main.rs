@@ -100,10 +100,9 @@ fn window(args: &WindowArgs) -> u8 {
     }
 }
 
-/// Renders what the window would have shown to `SCENE.png` in the current folder.
+/// Renders what the window would have shown to a picture.
 fn instead_of_window(args: &WindowArgs) -> u8 {
-    let name = args.scene.source().map_or_else(|_| "scene".to_owned(), |source| source.name());
-    headless_to(&args.scene, &args.output, vec![PathBuf::from(format!("{name}.png"))])
+    headless_to(&args.scene, &args.output, vec![picture_of(&args.scene)])
 }
 
 fn headless(scene: &SceneArgs, output: &OutputArgs) -> u8 {
@@ -119,7 +118,16 @@ fn headless(scene: &SceneArgs, output: &OutputArgs) -> u8 {
             outputs.push(path.clone());
         }
     }
+    if outputs.is_empty() && !output.json {
+        outputs.push(picture_of(scene));
+    }
     headless_to(scene, output, outputs)
+}
+
+/// `SCENE.png` in the current folder.
+fn picture_of(scene: &SceneArgs) -> PathBuf {
+    let name = scene.source().map_or_else(|_| "scene".to_owned(), |source| source.name());
+    PathBuf::from(format!("{name}.png"))
 }
 
 fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) -> u8 {
@@ -130,9 +138,6 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
             return exit::SCENE_NOT_READABLE;
         }
     };
-    if outputs.is_empty() && !output.json {
-        eprintln!("note: no -o FILE: nothing will be written");
-    }
     set_threads(scene.threads);
     let interrupt = Arc::new(AtomicBool::new(false));
     stop_on_signals(&interrupt);
