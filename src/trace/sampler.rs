@@ -74,11 +74,11 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
 fn sobol_1(index: u32) -> u32 {
     // The generator matrix is Pascal's triangle modulo 2, so multiplying by it is five sweeps.
     let mut x = index.reverse_bits();
-    x ^= x >> 16 & 0x0000_ffff;
-    x ^= x >> 8 & 0x00ff_00ff;
-    x ^= x >> 4 & 0x0f0f_0f0f;
-    x ^= x >> 2 & 0x3333_3333;
-    x ^ x >> 1 & 0x5555_5555
+    x ^= x << 16;
+    x ^= x << 8 & 0xff00_ff00;
+    x ^= x << 4 & 0xf0f0_f0f0;
+    x ^= x << 2 & 0xcccc_cccc;
+    x ^ x << 1 & 0xaaaa_aaaa
 }
 
 #[cfg(test)]
