@@ -286,6 +286,11 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
             (from != to).then_some(FlatLight::Segment { from, to, strength, emission })
         }
         Light::Parallelogram { edge_u, edge_v, radiance, two_sided } => {
+            // A mirroring placement turns the cross product round; walking the first edge backward turns
+            // it back, so that the front stays where the mirror image has it.
+            let [a, b, c, d] = radiance;
+            let mirrored = placed.matrix3.determinant() < 0.0;
+            let (edge_u, radiance) = if mirrored { (-edge_u, [b, a, d, c]) } else { (edge_u, radiance) };
             // Double precision until the corner is known.
             let edge = |v: Vec3| placed.transform_vector3(v.as_dvec3());
             let corner = (placed.translation - (edge(edge_u) + edge(edge_v)) * 0.5).as_vec3();
@@ -321,7 +326,8 @@ fn mesh_light(
     placed: &DAffine3,
     material: &Material,
 ) -> Option<MeshLight> {
-    let mut light = MeshLight { instance, two_sided: material.double_sided, ..MeshLight::default() };
+    let mirrored = placed.matrix3.determinant() < 0.0;
+    let mut light = MeshLight { instance, two_sided: material.double_sided, mirrored, ..MeshLight::default() };
     let mut areas = Vec::new();
     for triangle in 0..mesh.triangles.len() {
         if mesh.slot(triangle) != usize::from(slot) {

@@ -13,21 +13,55 @@ use std::f32::consts::PI;
 /// A light in render space.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FlatLight {
-    /// Intensity W/sr.
-    Point { position: Vec3, intensity: Vec3 },
-    /// Intensity W/sr on the axis; `cos_outer` < `cos_inner`.
-    Spot { position: Vec3, axis: Vec3, intensity: Vec3, cos_inner: f32, cos_outer: f32 },
-    /// Light travels along `axis`; a disc of cosine `cos_radius` and this radiance, or, at radius 0, this
-    /// irradiance.
-    Directional { axis: Vec3, irradiance: Vec3, sin2_radius: f32 },
+    /// The same to all sides.
+    Point {
+        /// Where it is.
+        position: Vec3,
+        /// Radiant intensity, W/sr.
+        intensity: Vec3,
+    },
+    /// A cone around `axis`.
+    Spot {
+        /// Its tip.
+        position: Vec3,
+        /// Unit direction in which light leaves.
+        axis: Vec3,
+        /// Radiant intensity on the axis, W/sr.
+        intensity: Vec3,
+        /// Cosine of the half angle of full intensity.
+        cos_inner: f32,
+        /// Cosine of the half angle of darkness, below `cos_inner`.
+        cos_outer: f32,
+    },
+    /// A disc infinitely far away.
+    Directional {
+        /// Unit direction in which light travels.
+        axis: Vec3,
+        /// Irradiance on a surface facing it, W/m².
+        irradiance: Vec3,
+        /// Squared sine of the disc's angular radius; 0 for a point, which no ray can find.
+        sin2_radius: f32,
+    },
     /// A line.
-    Segment { from: Vec3, to: Vec3, strength: [Vec3; 2], emission: Emission },
+    Segment {
+        /// One end.
+        from: Vec3,
+        /// The other end.
+        to: Vec3,
+        /// Intensity per length at both ends, perpendicular to the line, W/(sr m).
+        strength: [Vec3; 2],
+        /// How it depends on the angle to the line.
+        emission: Emission,
+    },
     /// Anything flat or round that rays can hit.
     Shape(ShapeLight),
     /// Triangles of an emissive instance.
     Mesh(MeshLight),
     /// Everywhere beyond the scene.
-    Environment { radiance: Vec3 },
+    Environment {
+        /// Radiance, W/(m² sr).
+        radiance: Vec3,
+    },
 }
 
 /// A solid area light.
@@ -35,7 +69,7 @@ pub enum FlatLight {
 pub struct ShapeLight {
     /// Its form.
     pub shape: Shape,
-    /// Radiance at the corners of a parallelogram; elsewhere all the same.
+    /// Radiance, W/(m² sr), at the corners −u−v, +u−v, −u+v, +u+v of a parallelogram; elsewhere all the same.
     pub radiance: [Vec3; 4],
     /// Emits to both sides.
     pub two_sided: bool,
@@ -47,11 +81,30 @@ pub struct ShapeLight {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// `corner` + a `u` + b `v`, a and b in 0..=1; the front is the side of u × v.
-    Parallelogram { corner: Vec3, u: Vec3, v: Vec3 },
-    /// Radius and unit normal of the front.
-    Disk { center: Vec3, normal: Vec3, radius: f32 },
-    /// Emits on both sides.
-    Sphere { center: Vec3, radius: f32 },
+    Parallelogram {
+        /// Where a and b are 0.
+        corner: Vec3,
+        /// Whole first edge.
+        u: Vec3,
+        /// Whole second edge.
+        v: Vec3,
+    },
+    /// A flat round plate.
+    Disk {
+        /// Its middle.
+        center: Vec3,
+        /// Unit normal of the front.
+        normal: Vec3,
+        /// Its radius, above 0.
+        radius: f32,
+    },
+    /// A ball that emits outward and inward.
+    Sphere {
+        /// Its middle.
+        center: Vec3,
+        /// Its radius, above 0.
+        radius: f32,
+    },
 }
 
 /// Triangles of an emissive instance, chosen in proportion to their emitted power.
@@ -67,6 +120,8 @@ pub struct MeshLight {
     pub cumulative: Vec<f32>,
     /// Emits on the back too.
     pub two_sided: bool,
+    /// The placement mirrors: the front is where `corners` run clockwise.
+    pub mirrored: bool,
     /// Luminance of the radiant exitance summed over the area, W.
     pub power: f32,
 }
@@ -329,7 +384,7 @@ impl MeshLight {
         let [a, b, c] = self.corners[i];
         let position = a * (1.0 - b1 - b2) + b * b1 + c * b2;
         let cross = (b - a).cross(c - a);
-        let normal = cross.try_normalize()?;
+        let normal = cross.try_normalize()? * if self.mirrored { -1.0 } else { 1.0 };
         let area = 0.5 * cross.length() / share;
         let sample = sample_flat(point, position, normal, area, self.two_sided, Vec3::ONE)?;
         Some(LightSample { triangle: Some((self.instance, self.triangles[i])), uv: Vec2::new(b1, b2), ..sample })
