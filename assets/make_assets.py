@@ -268,45 +268,97 @@ def box(obj, base, height, centre, turn):
         obj.face([(x1, low, z1), (x0, low, z0), (x0, high, z0), (x1, high, z1)])
 
 
+def star(centre, axis, tip, notch, points):
+    """Triangles of a flat star that faces along `axis`."""
+    side = unit(cross(axis, (0.0, 1.0, 0.0)))
+    up = cross(side, axis)
+
+    def at(i):
+        a, r = math.pi * i / points, notch if i % 2 else tip
+        return tuple(centre[j] + r * (math.sin(a) * side[j] + math.cos(a) * up[j]) for j in range(3))
+
+    return [[centre, at(i + 1), at(i)] for i in range(2 * points)]
+
+
+# A bay is this wide, high and deep; all are open to +z.
+WIDE, HIGH, DEEP = 2.0, 2.4, 1.8
+# Where lamps hang and what they are turned to, from the middle of the front of a bay's floor.
+LAMP, LIT = (-0.68, 1.6, -0.4), (0.15, 0.5, -1.4)
+# Where the sun of gallery.toml travels, and the bay it may enter.
+SUN, SUN_COLUMN, SUN_ROW = (0.2, -0.7, -0.6), 2, 1
+
+
+def canopy(obj):
+    """Shades all bays from the sun but one, which has no roof either: their fronts, cast along the sun onto a rising plane."""
+    slope = 2.5
+
+    def cast(x, y):
+        """Where the ray of the sun through (x, y, 0) meets z = slope * (height - roof)."""
+        t = slope * (2 * HIGH - y) / (slope * SUN[1] - SUN[2])
+        return (x + t * SUN[0], y + t * SUN[1], t * SUN[2])
+
+    def shade(x0, x1, y0, y1):
+        obj.face([cast(x0, y0), cast(x1, y0), cast(x1, y1), cast(x0, y1)])
+
+    left, right, low, high = -0.3, 4 * WIDE, -0.3, 2 * HIGH
+    hole = (SUN_COLUMN * WIDE + 0.15, (SUN_COLUMN + 1) * WIDE - 0.15, SUN_ROW * HIGH + 0.15, high)
+    shade(left, right, low, hole[2])
+    shade(left, hole[0], hole[2], high)
+    shade(hole[1], right, hole[2], high)
+
+
 def gallery():
-    """Eight booths in two storeys, 2 x 2 x 2 each, open to +z; the last above has no roof."""
-    obj = Obj("Booths for one light each", "gallery.mtl")
-    obj.name("booths")
+    """Eight bays, four beside four, each with the same things to cast a shadow."""
+    obj = Obj("Bays for one light each", "gallery.mtl")
+    obj.name("bays")
     obj.use("wall")
-    wide = 8.0
-    for floor in (0, 2):
-        obj.face([(0, floor, 0), (wide, floor, 0), (wide, floor, -2), (0, floor, -2)])
-        obj.face([(0, floor, -2), (wide, floor, -2), (wide, floor + 2, -2), (0, floor + 2, -2)])
-        for i in range(5):
-            x = 2.0 * i
-            obj.face([(x, floor, 0), (x, floor, -2), (x, floor + 2, -2), (x, floor + 2, 0)])
-    obj.face([(0, 4, -2), (6, 4, -2), (6, 4, 0), (0, 4, 0)])
+    width, back = 4 * WIDE, -DEEP
+    for row in range(3):
+        for column in range(4):
+            if (column, row) != (SUN_COLUMN, SUN_ROW + 1):
+                x, y = column * WIDE, row * HIGH
+                obj.face([(x, y, 0), (x + WIDE, y, 0), (x + WIDE, y, back), (x, y, back)])
+    for row in range(2):
+        low, high = row * HIGH, (row + 1) * HIGH
+        obj.face([(0, low, back), (width, low, back), (width, high, back), (0, high, back)])
+        for column in range(5):
+            x = column * WIDE
+            obj.face([(x, low, 0), (x, low, back), (x, high, back), (x, high, 0)])
+    # Edges of the walls, so that the bays stay apart in the picture.
+    trim = 0.025
+    for column in range(5):
+        x = column * WIDE
+        obj.face([(x - trim, 0, 0), (x + trim, 0, 0), (x + trim, 2 * HIGH, 0), (x - trim, 2 * HIGH, 0)])
+    for row in range(3):
+        x, y = SUN_COLUMN * WIDE if row == SUN_ROW + 1 else width, row * HIGH
+        obj.face([(0, y - trim, 0), (x, y - trim, 0), (x, y + trim, 0), (0, y + trim, 0)])
+    obj.name("canopy")
+    canopy(obj)
     obj.name("occluders")
     obj.use("occluder")
-    for floor in (0, 2):
-        for i in range(4):
-            box(obj, 0.3, 0.75, (2 * i + 1.0, floor, -1.0), 0.5)
-    # The emissive mesh hangs in the last booth below.
+    for row in range(2):
+        for column in range(4):
+            x, y = WIDE * column + 0.5 * WIDE, HIGH * row
+            # The pole that carries a ball, and a fence that leaves the wall.
+            box(obj, 0.05, 1.0, (x - 0.15, y, -1.2), 0.0)
+            for i in range(4):
+                box(obj, 0.05, 0.42, (x + 0.38 + 0.12 * i, y, -1.7 + 0.24 * i), 0.0)
     obj.name("lamp")
     obj.use("lamp")
-    x, y, z, r = 7.0, 1.62, -1.0, 0.22
-    tips = [(x + r, y, z), (x, y, z + r), (x - r, y, z), (x, y, z - r)]
-    for i in range(4):
-        a, b = tips[i], tips[(i + 1) % 4]
-        obj.face([b, a, (x, y + r, z)])
-        obj.face([a, b, (x, y - r, z)])
+    for triangle in star((7 + LAMP[0], LAMP[1], LAMP[2]), unit(sub(LIT, LAMP)), 0.28, 0.11, 5):
+        obj.face(triangle)
     obj.save("gallery.obj")
     write("gallery.mtl", """newmtl wall
 Kd 0.7 0.7 0.7
 illum 1
 
 newmtl occluder
-Kd 0.6 0.5 0.4
+Kd 0.6 0.42 0.25
 illum 1
 
 newmtl lamp
 Kd 0 0 0
-Ke 40 36 28
+Ke 80 75 66
 illum 1
 """)
 

@@ -49,7 +49,7 @@ pub fn built_in_scenes() -> &'static [BuiltIn] {
             scene(
                 "gallery",
                 "gallery.toml",
-                "every shape of light, each in its own booth with its own shadow",
+                "every shape of light, each in its own bay with its shadow",
             )
         },
         const {
