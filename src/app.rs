@@ -4,7 +4,7 @@ use crate::image::develop::{Display, Picture, develop};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::propagate_transforms;
-use crate::sync::{self, Redone, RenderOrigin, SurfaceNumbers};
+use crate::sync::{self, Redone, RenderOrigin, MaterialNumbers};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
     Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
@@ -105,7 +105,7 @@ impl App {
         world.init_resource::<Lights>();
         world.init_resource::<Viewpoint>();
         world.init_resource::<RenderOrigin>();
-        world.init_resource::<SurfaceNumbers>();
+        world.init_resource::<MaterialNumbers>();
         world.init_resource::<Redone>();
         world.add_schedule(frame_schedule());
         Self { world }

@@ -3,6 +3,8 @@
 //! Data flows one way: files → [`load`] → entities ([`scene`]) → `sync` → flat arrays → `bvh` and
 //! [`trace`] → film → [`image`](mod@image) → file or screen. [`app`] holds the one list of systems.
 
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
+
 pub mod app;
 pub mod bvh;
 pub mod cli;

@@ -46,7 +46,7 @@ impl TriangleMesh {
     pub fn drop_degenerate(&mut self) -> usize {
         let keep: Vec<bool> = (0..self.triangles.len())
             .map(|i| {
-                let [a, b, c] = self.corners(i).map(|p| p.as_dvec3());
+                let [a, b, c] = self.corners(i).map(Vec3::as_dvec3);
                 let normal = (b - a).cross(c - a);
                 normal.is_finite() && normal.length_squared() > 0.0
             })

@@ -1,0 +1,97 @@
+//! Meshes and instances → the two levels of the hierarchy.
+
+use super::{Redone, RenderOrigin, MaterialNumbers};
+use crate::bvh::{Blas, Placement, Tlas};
+use crate::scene::{GlobalTransform, Instance, Mesh};
+use crate::trace::Geometry;
+use crate::trace::scene::InstanceData;
+use bevy_ecs::prelude::*;
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// The bottom-level hierarchy of a [`Mesh`], on its entity; derived by [`build_blas`].
+#[derive(Component, Clone, Debug)]
+pub struct MeshBlas(pub Arc<Blas>);
+
+/// Builds the BLAS of each new or changed mesh.
+pub fn build_blas(
+    mut commands: Commands,
+    mut redone: ResMut<Redone>,
+    changed: Query<(Entity, &Mesh), Changed<Mesh>>,
+    mut removed: RemovedComponents<Mesh>,
+) {
+    for (entity, mesh) in &changed {
+        let triangles: Vec<[Vec3; 3]> = (0..mesh.0.triangles.len()).map(|i| mesh.0.corners(i)).collect();
+        commands.entity(entity).insert(MeshBlas(Arc::new(Blas::build(&triangles))));
+        redone.blas += 1;
+    }
+    for entity in removed.read() {
+        if let Ok(mut entity) = commands.get_entity(entity) {
+            entity.remove::<MeshBlas>();
+        }
+    }
+}
+
+/// Picks [`RenderOrigin`] when the first geometry is there: the scene's middle, rounded to a multiple of a
+/// power of two not below its extent, so that a scene around the origin stays where it is.
+pub fn choose_origin(
+    mut origin: ResMut<RenderOrigin>,
+    instances: Query<(&Instance, &GlobalTransform)>,
+    meshes: Query<&MeshBlas>,
+) {
+    if origin.0.is_some() || instances.is_empty() {
+        return;
+    }
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (instance, global) in &instances {
+        let Ok(MeshBlas(blas)) = meshes.get(instance.mesh) else { continue };
+        let bounds = blas.bounds();
+        for corner in [bounds.min, bounds.max] {
+            let p = global.0.transform_point3(corner.as_dvec3());
+            (low, high) = (low.min(p), high.max(p));
+        }
+    }
+    let extent = (high - low).max_element();
+    let finite = low.is_finite() && high.is_finite();
+    let grid = if extent > 0.0 { extent.log2().ceil().exp2() } else { 1.0 };
+    origin.0 = Some(if finite { ((low + high) * (0.5 / grid)).round() * grid } else { DVec3::ZERO });
+}
+
+/// Builds the TLAS anew when an instance came, went, moved or changed its mesh or materials.
+pub fn sync_geometry(
+    mut geometry: ResMut<Geometry>,
+    mut redone: ResMut<Redone>,
+    origin: Res<RenderOrigin>,
+    numbers: Res<MaterialNumbers>,
+    instances: Query<(Entity, &Instance, &GlobalTransform)>,
+    meshes: Query<(&Mesh, &MeshBlas)>,
+    changed: (
+        Query<(), (With<Instance>, Or<(Changed<Instance>, Changed<GlobalTransform>)>)>,
+        Query<(), Changed<MeshBlas>>,
+    ),
+    mut removed: (RemovedComponents<Instance>, RemovedComponents<MeshBlas>),
+) {
+    let removed = removed.0.read().count() + removed.1.read().count();
+    let unchanged = changed.0.is_empty() && changed.1.is_empty() && removed == 0;
+    // Values of materials don't matter here, only which numbers they have.
+    if unchanged && !numbers.is_changed() {
+        return;
+    }
+    let mut placed: Vec<_> = instances.iter().collect();
+    placed.sort_unstable_by_key(|(entity, ..)| *entity);
+    let (mut placements, mut data) = (Vec::new(), Vec::new());
+    for (_, instance, global) in placed {
+        let Ok((mesh, MeshBlas(blas))) = meshes.get(instance.mesh) else { continue };
+        let render_from_local = origin.render_from(global);
+        let Some(placement) = Placement::new(Arc::clone(blas), render_from_local) else { continue };
+        placements.push(placement);
+        data.push(InstanceData {
+            mesh: Arc::clone(&mesh.0),
+            materials: instance.materials.iter().map(|&m| numbers.of(m)).collect(),
+            normal_matrix: render_from_local.matrix3.inverse().transpose(),
+        });
+    }
+    *geometry = Geometry { tlas: Tlas::build(placements), instances: data };
+    redone.tlas += 1;
+}
+

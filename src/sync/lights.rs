@@ -1,0 +1,147 @@
+//! Lights and whatever emits → the light list.
+
+use super::{Redone, RenderOrigin};
+use crate::scene::color::luminance;
+use crate::scene::{GlobalTransform, Light, Material, TriangleMesh, Visible};
+use crate::trace::light::{FlatLight, MeshLight, Shape, ShapeLight, triangle_area};
+use crate::trace::scene::InstanceData;
+use crate::trace::{Geometry, Lights, Surfaces};
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, Vec3};
+
+/// Makes the light list anew when a light changed, or something that emits may have.
+pub fn sync_lights(
+    mut lights: ResMut<Lights>,
+    mut redone: ResMut<Redone>,
+    origin: Res<RenderOrigin>,
+    geometry: Res<Geometry>,
+    surfaces: Res<Surfaces>,
+    all: Query<(Entity, &Light, &GlobalTransform, Option<&Visible>)>,
+    changed: Query<(), (With<Light>, Or<(Changed<Light>, Changed<GlobalTransform>, Changed<Visible>)>)>,
+    mut removed: (RemovedComponents<Light>, RemovedComponents<Visible>),
+) {
+    let removed = removed.0.read().count() + removed.1.read().count();
+    if changed.is_empty() && removed == 0 && !geometry.is_changed() && !surfaces.is_changed() {
+        return;
+    }
+    let mut placed: Vec<_> = all.iter().collect();
+    placed.sort_unstable_by_key(|(entity, ..)| *entity);
+    let mut flat: Vec<FlatLight> = placed
+        .into_iter()
+        .filter_map(|(_, light, global, visible)| flatten(light, &origin.render_from(global), visible))
+        .collect();
+    let mut meshes = Vec::new();
+    for (instance, data) in (0..).zip(&geometry.instances) {
+        let placement = geometry.tlas.placements()[instance as usize].world_from_local();
+        for (slot, light) in mesh_lights(instance, data, placement, &surfaces) {
+            meshes.push(((instance, slot), flat.len() as u32));
+            flat.push(FlatLight::Mesh(light));
+        }
+    }
+    let bounds = geometry.tlas.bounds();
+    let radius = if bounds.is_empty() { 1.0 } else { 0.5 * (bounds.max - bounds.min).length() };
+    *lights = Lights::new(flat, meshes, radius);
+    redone.lights += 1;
+}
+
+/// The light in render space; `None` if it emits nothing or its placement left it no extent.
+fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Option<FlatLight> {
+    let position = placed.translation.as_vec3();
+    let vector = |v: Vec3| placed.transform_vector3(v.as_dvec3()).as_vec3();
+    let axis = || vector(Vec3::NEG_Z).try_normalize();
+    let solid = |shape: Shape, radiance: [Vec3; 4], two_sided: bool| {
+        let visible = visible.is_none_or(|v| v.0);
+        let area = shape.area();
+        let emits = radiance != [Vec3::ZERO; 4];
+        let light = ShapeLight { shape, radiance, two_sided, visible };
+        (area > 0.0 && area.is_finite() && emits).then_some(FlatLight::Shape(light))
+    };
+    match *light {
+        Light::Point { intensity } => Some(FlatLight::Point { position, intensity }),
+        Light::Spot { intensity, inner_angle, outer_angle } => Some(FlatLight::Spot {
+            position,
+            axis: axis()?,
+            intensity,
+            cos_inner: inner_angle.cos(),
+            cos_outer: outer_angle.cos(),
+        }),
+        Light::Directional { irradiance, angle } => {
+            let sin2_radius = (0.5 * angle).sin().powi(2);
+            Some(FlatLight::Directional { axis: axis()?, irradiance, sin2_radius })
+        }
+        Light::Segment { half_length, strength, emission } => {
+            let half = vector(Vec3::X * half_length);
+            let (from, to) = (position - half, position + half);
+            (from != to).then_some(FlatLight::Segment { from, to, strength, emission })
+        }
+        Light::Parallelogram { edge_u, edge_v, radiance, two_sided } => {
+            // A mirroring placement turns the cross product round; walking the first edge backward turns
+            // it back, so that the front stays where the mirror image has it.
+            let [a, b, c, d] = radiance;
+            let mirrored = placed.matrix3.determinant() < 0.0;
+            let (edge_u, radiance) = if mirrored { (-edge_u, [b, a, d, c]) } else { (edge_u, radiance) };
+            // Double precision until the corner is known.
+            let edge = |v: Vec3| placed.transform_vector3(v.as_dvec3());
+            let corner = (placed.translation - (edge(edge_u) + edge(edge_v)) * 0.5).as_vec3();
+            solid(Shape::Parallelogram { corner, u: vector(edge_u), v: vector(edge_v) }, radiance, two_sided)
+        }
+        Light::Disk { radius, radiance, two_sided } => {
+            let scale = vector(Vec3::X).length();
+            solid(Shape::Disk { center: position, normal: axis()?, radius: radius * scale }, [radiance; 4], two_sided)
+        }
+        Light::Sphere { radius, radiance } => {
+            let scale = Vec3::AXES.map(|a| vector(a).length()).iter().sum::<f32>() / 3.0;
+            solid(Shape::Sphere { center: position, radius: radius * scale }, [radiance; 4], true)
+        }
+        Light::Environment { radiance } => (radiance != Vec3::ZERO).then_some(FlatLight::Environment { radiance }),
+    }
+}
+
+/// The emissive slots of an instance, each as a light.
+fn mesh_lights(instance: u32, data: &InstanceData, placed: &DAffine3, surfaces: &Surfaces) -> Vec<(u16, MeshLight)> {
+    let surface = |slot: u16| {
+        let number = data.materials.get(usize::from(slot)).copied().unwrap_or(0);
+        &surfaces.materials[number as usize].material
+    };
+    let slots = 0..data.materials.len().max(1) as u16;
+    let emissive = slots.filter(|&slot| surface(slot).emission != Vec3::ZERO);
+    emissive.filter_map(|slot| Some((slot, mesh_light(instance, &data.mesh, slot, placed, surface(slot))?))).collect()
+}
+
+fn mesh_light(
+    instance: u32,
+    mesh: &TriangleMesh,
+    slot: u16,
+    placed: &DAffine3,
+    material: &Material,
+) -> Option<MeshLight> {
+    let mirrored = placed.matrix3.determinant() < 0.0;
+    let mut light = MeshLight { instance, two_sided: material.double_sided, mirrored, ..MeshLight::default() };
+    let mut areas = Vec::new();
+    for triangle in 0..mesh.triangles.len() {
+        if mesh.slot(triangle) != usize::from(slot) {
+            continue;
+        }
+        let corners = mesh.corners(triangle).map(|p| placed.transform_point3(p.as_dvec3()).as_vec3());
+        let area = triangle_area(&corners);
+        if area > 0.0 && area.is_finite() {
+            light.triangles.push(triangle as u32);
+            light.corners.push(corners);
+            areas.push(f64::from(area));
+        }
+    }
+    let total: f64 = areas.iter().sum();
+    let mut sum = 0.0;
+    light.cumulative = areas
+        .iter()
+        .map(|area| {
+            sum += area;
+            (sum / total) as f32
+        })
+        .collect();
+    *light.cumulative.last_mut()? = 1.0;
+    let sides = if light.two_sided { 2.0 } else { 1.0 };
+    light.power = std::f32::consts::PI * sides * luminance(material.emission) * total as f32;
+    Some(light)
+}
+

@@ -1,0 +1,94 @@
+//! Entities → flat arrays: the smallest redo for each change, and the one place that resets the film.
+//!
+//! | changed | redone |
+//! |---|---|
+//! | a mesh | its own BLAS, then the TLAS |
+//! | an instance, its transform; one added or removed | the TLAS |
+//! | a material or texture | the surface list (and the lights, for its emission) |
+//! | a light or its transform | the light list |
+//! | the camera, a setting | nothing |
+//!
+//! Below this file there are no entities: [`crate::trace`] sees indices only.
+
+mod geometry;
+mod lights;
+mod surfaces;
+
+pub use geometry::{MeshBlas, build_blas, choose_origin, sync_geometry};
+pub use lights::sync_lights;
+pub use surfaces::{MaterialNumbers, sync_surfaces};
+
+use crate::scene::{ActiveCamera, Camera, GlobalTransform};
+use crate::trace::{Film, Geometry, Lights, RenderSettings, Surfaces, Viewpoint};
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DVec3};
+
+/// Where render space has its origin in the world, chosen once per scene.
+///
+/// Coordinates are subtracted in double precision and only then rounded to f32, so a scene far from the
+/// world's origin loses nothing. Moving things later does not move the origin.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct RenderOrigin(pub Option<DVec3>);
+
+impl RenderOrigin {
+    /// `render_from_local` for something placed by `global`.
+    #[must_use]
+    pub fn render_from(&self, global: &GlobalTransform) -> DAffine3 {
+        let mut placed = global.0;
+        placed.translation -= self.0.unwrap_or_default();
+        placed
+    }
+}
+
+/// How often each thing was redone: for the HUD and for the tests that hold the table above.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Redone {
+    /// Bottom-level hierarchies built.
+    pub blas: u64,
+    /// Top-level hierarchies built.
+    pub tlas: u64,
+    /// Surface lists made.
+    pub surfaces: u64,
+    /// Light lists made.
+    pub lights: u64,
+    /// Film resets.
+    pub resets: u64,
+}
+
+/// Follows the active camera.
+pub fn sync_viewpoint(
+    mut viewpoint: ResMut<Viewpoint>,
+    origin: Res<RenderOrigin>,
+    active: Option<Res<ActiveCamera>>,
+    cameras: Query<(&Camera, &GlobalTransform)>,
+) {
+    if let Some((camera, global)) = active.and_then(|a| cameras.get(a.0).ok()) {
+        viewpoint.set_if_neq(Viewpoint::new(&origin.render_from(global), camera.projection));
+    }
+}
+
+/// Starts the picture anew when one of its inputs changed. Nothing else ever does.
+pub fn reset_film(
+    geometry: Res<Geometry>,
+    surfaces: Res<Surfaces>,
+    lights: Res<Lights>,
+    viewpoint: Res<Viewpoint>,
+    settings: Res<RenderSettings>,
+    mut film: ResMut<Film>,
+    mut redone: ResMut<Redone>,
+) {
+    let changed = geometry.is_changed()
+        || surfaces.is_changed()
+        || lights.is_changed()
+        || viewpoint.is_changed()
+        || settings.is_changed();
+    if !changed {
+        return;
+    }
+    if film.size() == settings.size.max(glam::UVec2::ONE) {
+        film.reset();
+    } else {
+        *film = Film::new(settings.size, film.first_sample());
+    }
+    redone.resets += 1;
+}
