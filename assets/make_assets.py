@@ -356,7 +356,7 @@ illum 1
 
 newmtl lamp
 Kd 0 0 0
-Ke 80 75 66
+Ke 110 103 91
 illum 1
 """)
 
