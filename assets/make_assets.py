@@ -149,9 +149,9 @@ EYES = [(-0.32, 1.34, 0.47), (0.32, 1.34, 0.47)]
 
 
 def owl_body(t, angle):
-    """Head, neck and shoulders as one skin: profile over t, hollows around the eyes, breast in front."""
+    """Head, neck and shoulders as one skin, closed under the floor: profile over t, hollows around the eyes, breast in front."""
     profile = [(0.0, 1.95, 0.0), (0.1, 1.86, 0.42), (0.22, 1.66, 0.72), (0.36, 1.36, 0.84), (0.48, 1.05, 0.74),
-               (0.58, 0.84, 0.6), (0.68, 0.62, 0.7), (0.8, 0.32, 0.92), (0.92, 0.02, 0.9), (1.0, 0.0, 0.0)]
+               (0.58, 0.84, 0.6), (0.68, 0.62, 0.7), (0.8, 0.36, 0.9), (0.8667, 0.08, 1.01), (0.9334, -0.2, 1.08), (1.0, -0.2, 0.0)]
     for (t0, y0, r0), (t1, y1, r1) in zip(profile, profile[1:]):
         if t <= t1 + 1e-9:
             f = (t - t0) / (t1 - t0)
@@ -163,9 +163,7 @@ def owl_body(t, angle):
         distance = math.dist((x, y, z), eye)
         # A shallow dish with a raised rim: the facial disc.
         z -= 0.16 * math.exp(-(distance / 0.26) ** 2) if z > 0 else 0.0
-        z += 0.07 * math.exp(-((distance - 0.42) / 0.1) ** 2) if z > 0 else 0.0
-    if z > 0 and abs(x) < 0.2 and y > 1.0:
-        z += 0.05
+        z += 0.05 * math.exp(-((distance - 0.45) / 0.18) ** 2) if z > 0 else 0.0
     return (x, y, z)
 
 
@@ -358,7 +356,7 @@ illum 1
 
 newmtl lamp
 Kd 0 0 0
-Ke 80 75 66
+Ke 110 103 91
 illum 1
 """)
 
