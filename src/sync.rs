@@ -80,10 +80,16 @@ pub fn choose_origin(
     for (instance, global) in &instances {
         let Ok(MeshBlas(blas)) = meshes.get(instance.mesh) else { continue };
         let bounds = blas.bounds();
+        if bounds.is_empty() {
+            continue;
+        }
         for corner in [bounds.min, bounds.max] {
             let p = global.0.transform_point3(corner.as_dvec3());
             (low, high) = (low.min(p), high.max(p));
         }
+    }
+    if low == DVec3::INFINITY {
+        return;
     }
     let extent = (high - low).max_element();
     let finite = low.is_finite() && high.is_finite();
@@ -255,8 +261,11 @@ pub fn sync_lights(
     redone.lights += 1;
 }
 
-/// The light in render space; `None` if it emits nothing or its placement left it no extent.
+/// The light in render space; `None` if it emits nothing, has no place, or its placement left it no extent.
 fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Option<FlatLight> {
+    if !placed.is_finite() {
+        return None;
+    }
     let position = placed.translation.as_vec3();
     let vector = |v: Vec3| placed.transform_vector3(v.as_dvec3()).as_vec3();
     let axis = || vector(Vec3::NEG_Z).try_normalize();
