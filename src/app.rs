@@ -216,7 +216,9 @@ pub fn trace_frame(
         viewpoint: &viewpoint,
         settings: &settings,
     };
-    let until = film.first_sample().saturating_add(budget.sample_target);
+    // Sample indices end with u32: nobody waits for those beyond.
+    let target = budget.sample_target.min(u32::MAX - film.first_sample());
+    let until = film.first_sample() + target;
     let mut start = Instant::now();
     let mut seconds = 0.0;
     let mut rays = RayCounts::default();
@@ -240,7 +242,7 @@ pub fn trace_frame(
     }
     let in_time = || budget.time.is_none_or(|time| start.elapsed() < time);
     let keep_going = || in_time() && !budget.interrupt.load(Ordering::Relaxed);
-    while film.complete_samples() < budget.sample_target && keep_going() {
+    while film.complete_samples() < target && keep_going() {
         rays = rays + trace_pass(&scene, &mut film, until, budget.pass_samples, keep_going);
         if budget.time.is_none() {
             break;
@@ -253,7 +255,7 @@ pub fn trace_frame(
         stats.rays_per_second = rays.total() as f64 / seconds;
     }
     stats.samples_per_pixel = film.mean_samples();
-    stats.done = film.complete_samples() >= budget.sample_target;
+    stats.done = film.complete_samples() >= target;
     stats.preview_scale = (film.complete_samples() == 0).then(|| preview.scale()).filter(|&s| s > 1);
     stats.dropped = film.dropped();
     // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter.

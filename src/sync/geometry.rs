@@ -46,10 +46,16 @@ pub fn choose_origin(
     for (instance, global) in &instances {
         let Ok(MeshBlas(blas)) = meshes.get(instance.mesh) else { continue };
         let bounds = blas.bounds();
+        if bounds.is_empty() {
+            continue;
+        }
         for corner in [bounds.min, bounds.max] {
             let p = global.0.transform_point3(corner.as_dvec3());
             (low, high) = (low.min(p), high.max(p));
         }
+    }
+    if low == DVec3::INFINITY {
+        return;
     }
     let extent = (high - low).max_element();
     let finite = low.is_finite() && high.is_finite();

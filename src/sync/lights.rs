@@ -44,8 +44,11 @@ pub fn sync_lights(
     redone.lights += 1;
 }
 
-/// The light in render space; `None` if it emits nothing or its placement left it no extent.
+/// The light in render space; `None` if it emits nothing, has no place, or its placement left it no extent.
 fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Option<FlatLight> {
+    if !placed.is_finite() {
+        return None;
+    }
     let position = placed.translation.as_vec3();
     let vector = |v: Vec3| placed.transform_vector3(v.as_dvec3()).as_vec3();
     let axis = || vector(Vec3::NEG_Z).try_normalize();
