@@ -188,6 +188,7 @@ fn renumber(numbers: &mut HashMap<Entity, u32>, mut present: Vec<Entity>, first:
 }
 
 /// Builds the TLAS anew when an instance came, went, moved or changed its mesh or materials.
+#[expect(clippy::too_many_arguments, reason = "what it reads, what it writes, and what makes it run")]
 pub fn sync_geometry(
     mut geometry: ResMut<Geometry>,
     mut redone: ResMut<Redone>,

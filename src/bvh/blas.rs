@@ -107,7 +107,7 @@ impl Blas {
 
 /// Judged in double precision, where differences and products of f32 are exact or nearly so.
 fn has_surface(corners: &[Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
     let normal = (b - a).cross(c - a);
     normal.is_finite() && normal != DVec3::ZERO
 }

@@ -188,9 +188,9 @@ fn sah_cut(prims: &[Prim], bounds: &Aabb, centers: &Aabb) -> Cut {
     let area = bounds.half_area();
     let leaf_cost = area * prims.len() as f32;
     match best {
-        // Written so that an overflowing or undefined cost still splits a large list.
-        Some((cost, _)) if prims.len() <= MAX_LEAF && !(NODE_COST * area + cost < leaf_cost) => Cut::Leaf,
-        Some((_, plane)) => Cut::Plane(plane),
+        // A large list is split whatever it costs, also where the cost overflows or is undefined.
+        Some((cost, plane)) if prims.len() > MAX_LEAF || NODE_COST * area + cost < leaf_cost => Cut::Plane(plane),
+        Some(_) => Cut::Leaf,
         None => Cut::Halves,
     }
 }

@@ -141,7 +141,7 @@ impl Probe {
     /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to
     /// the origin of the ray that is not enough: a ray that starts on a large triangle would hit it.
     fn plane_distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
-        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
         let normal = (b - a).cross(c - a);
         let t = normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3());
         t.is_finite().then_some(t as f32)

@@ -96,7 +96,7 @@ impl Tlas {
         // An empty mesh gets a point that is never entered with a hit.
         let boxes: Vec<Aabb> = placements
             .iter()
-            .map(|p| p.world_bounds())
+            .map(Placement::world_bounds)
             .map(|b| if b.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { b })
             .collect();
         let slack = placements.iter().map(Placement::condition).fold(1.0, f32::max);
