@@ -1,4 +1,9 @@
 //! Every `sample` against its `pdf`, and what the film says about its own noise.
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "a test shows its figures, and fails at the first wrong one"
+)]
 
 #[path = "support/stage.rs"]
 mod stage;

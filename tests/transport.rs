@@ -1,4 +1,9 @@
 //! Energy on its way from surface to surface: furnaces, mirrors, self-intersection, two estimators of one thing.
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "a test shows its figures, and fails at the first wrong one"
+)]
 
 #[path = "support/stage.rs"]
 mod stage;
@@ -400,8 +405,7 @@ fn direct_light_is_the_path_tracers_first_bounce_with_every_kind_of_light() {
             place(0.0, 3.0, -2.0),
         );
         stage.look_wide(DVec3::new(2.0, 2.5, 4.0), DVec3::new(0.0, 0.8, 0.0));
-        let film = stage.trace(256).clone();
-        film
+        stage.trace(256).clone()
     };
     let (direct, path) = (picture(Integrator::Direct), picture(Integrator::Path));
     // 8×8 pixels together; the halves of both films tell the noise of their difference.
@@ -579,7 +583,7 @@ fn returns(alone: &Alone, rng: &mut Rng, points: u32, rays: u32) -> (u32, u32) {
 
 /// Height over longest side, twice: 1 and more for a good triangle, next to 0 for a needle.
 fn roundness([a, b, c]: [Vec3; 3]) -> f64 {
-    let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
     let longest = (b - a)
         .length_squared()
         .max((c - b).length_squared())

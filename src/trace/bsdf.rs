@@ -155,23 +155,23 @@ impl Bsdf {
         }
         let shares = self.shares(wo, lobes);
         let mut pdf = shares[0] * n_dot_l / PI;
-        if shares[1] > 0.0 {
-            if let Some(h) = (wo + wi).try_normalize() {
-                let n_dot_h = self.normal.dot(h).max(0.0);
-                let v_dot_h = wo.dot(h).max(1e-7);
-                pdf += shares[1]
-                    * match self.glossy {
-                        Lobe::None => 0.0,
-                        Lobe::BlinnPhong { exponent, .. } => {
-                            (exponent + 1.0) / (2.0 * PI) * n_dot_h.powf(exponent) / (4.0 * v_dot_h)
-                        }
-                        Lobe::Ggx { alpha, .. } => {
-                            // Visible normals: D · G1 / (4 n·v).
-                            let sin2 = self.normal.cross(h).length_squared();
-                            ggx_distribution(sin2, alpha) * smith_g1(n_dot_v, alpha) / (4.0 * n_dot_v)
-                        }
-                    };
-            }
+        if shares[1] > 0.0
+            && let Some(h) = (wo + wi).try_normalize()
+        {
+            let n_dot_h = self.normal.dot(h).max(0.0);
+            let v_dot_h = wo.dot(h).max(1e-7);
+            pdf += shares[1]
+                * match self.glossy {
+                    Lobe::None => 0.0,
+                    Lobe::BlinnPhong { exponent, .. } => {
+                        (exponent + 1.0) / (2.0 * PI) * n_dot_h.powf(exponent) / (4.0 * v_dot_h)
+                    }
+                    Lobe::Ggx { alpha, .. } => {
+                        // Visible normals: D · G1 / (4 n·v).
+                        let sin2 = self.normal.cross(h).length_squared();
+                        ggx_distribution(sin2, alpha) * smith_g1(n_dot_v, alpha) / (4.0 * n_dot_v)
+                    }
+                };
         }
         pdf
     }

@@ -251,7 +251,8 @@ impl ShapeLight {
                 let to_center = *center - point;
                 let distance2 = to_center.length_squared();
                 let sin2 = radius * radius / distance2;
-                if !(sin2 < 1.0) {
+                // Also at the very centre, where `sin2` is infinite.
+                if sin2 >= 1.0 {
                     // Inside: every direction sees it.
                     let wi = uniform_sphere(u);
                     let t = sphere_roots(point, wi, *center, *radius)?.1;

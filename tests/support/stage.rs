@@ -1,5 +1,6 @@
 //! A stage to measure light on: a world, something that receives, a camera that sees nothing else.
 #![allow(dead_code, reason = "each test file uses its part")]
+#![allow(clippy::print_stdout, reason = "a test shows its figures")]
 
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DQuat, DVec3, UVec2, Vec2, Vec3};
