@@ -4,7 +4,7 @@ use crate::image::develop::{Display, Picture, develop};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::propagate_transforms;
-use crate::sync::{self, Redone, RenderOrigin, MaterialNumbers};
+use crate::sync::{self, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
     Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
@@ -260,7 +260,8 @@ pub fn trace_frame(
     stats.dropped = film.dropped();
     // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter.
     let complete = film.complete_samples();
-    if complete >= 2 && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
+    if complete >= 2
+        && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
         && complete != stats.noise_samples
     {
         stats.noise = relative_noise(&film);
@@ -269,7 +270,12 @@ pub fn trace_frame(
 }
 
 /// Film → [`Picture`], when either it or the way of showing it has changed.
-pub fn develop_film(film: Res<Film>, preview: Res<Preview>, display: Res<Display>, mut picture: ResMut<Picture>) {
+pub fn develop_film(
+    film: Res<Film>,
+    preview: Res<Preview>,
+    display: Res<Display>,
+    mut picture: ResMut<Picture>,
+) {
     if film.is_changed() || display.is_changed() {
         picture.size = film.size();
         picture.rgba = develop(&film, preview.film(), &display);

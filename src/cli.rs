@@ -239,7 +239,8 @@ fn resolution(text: &str) -> Result<UVec2, String> {
 
 fn vector(text: &str) -> Result<DVec3, String> {
     let wrong = || format!("\"{text}\" is not a vector such as 1,2.5,-3");
-    let numbers: Vec<f64> = text.split(',').map(|s| s.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    let numbers: Vec<f64> =
+        text.split(',').map(|s| s.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
     let [x, y, z] = *numbers.as_slice() else { return Err(wrong()) };
     let vector = DVec3::new(x, y, z);
     if vector.is_finite() { Ok(vector) } else { Err(wrong()) }
@@ -247,7 +248,11 @@ fn vector(text: &str) -> Result<DVec3, String> {
 
 fn view_angle(text: &str) -> Result<f32, String> {
     let degrees = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    if 0.0 < degrees && degrees < 180.0 { Ok(degrees) } else { Err("must lie between 0 and 180 degrees".to_owned()) }
+    if 0.0 < degrees && degrees < 180.0 {
+        Ok(degrees)
+    } else {
+        Err("must lie between 0 and 180 degrees".to_owned())
+    }
 }
 
 fn exposure(text: &str) -> Result<f32, String> {
@@ -256,7 +261,8 @@ fn exposure(text: &str) -> Result<f32, String> {
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
-    let number: f64 = text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    let number: f64 =
+        text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
     Duration::try_from_secs_f64(number).map_err(|e| e.to_string())
 }
 

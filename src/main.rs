@@ -7,9 +7,9 @@ use penumbra::image::PictureFormat;
 use penumbra::image::compare::compare_files;
 use penumbra::load::{LoadReport, built_in_scenes};
 use penumbra::open::OpenError;
+use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 #[cfg(feature = "view")]
 use penumbra::{app::FrameBudget, open::open, trace::RenderSettings};
-use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -242,7 +242,8 @@ struct Bar {
 impl Bar {
     fn new(quiet: bool) -> Self {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
-            let style = ProgressStyle::with_template("{bar:32} {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+            let style = ProgressStyle::with_template("{bar:32} {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
             ProgressBar::new(1000).with_style(style)
         });
         Self { bar, last_line: std::cell::Cell::new(Some(Instant::now())), quiet }
@@ -250,14 +251,26 @@ impl Bar {
 
     fn update(&self, progress: &Progress) {
         let by_samples = progress.samples / f64::from(progress.target);
-        let part = progress.limit.map_or(by_samples, |limit| by_samples.max(progress.seconds / limit)).clamp(0.0, 1.0);
-        let left = if part > 0.01 { format!("{:.0} s left", progress.seconds / part * (1.0 - part)) } else { "…".into() };
+        let part = progress
+            .limit
+            .map_or(by_samples, |limit| by_samples.max(progress.seconds / limit))
+            .clamp(0.0, 1.0);
+        let left = if part > 0.01 {
+            format!("{:.0} s left", progress.seconds / part * (1.0 - part))
+        } else {
+            "…".into()
+        };
         let noise = progress.noise.map_or("—".to_owned(), |n| format!("{:.2} %", n * 100.0));
-        let message = format!("{:.0} samples per pixel, noise {noise}, {:.0} s, {left}", progress.samples, progress.seconds);
+        let message = format!(
+            "{:.0} samples per pixel, noise {noise}, {:.0} s, {left}",
+            progress.samples, progress.seconds
+        );
         if let Some(bar) = &self.bar {
             bar.set_position((part * 1000.0) as u64);
             bar.set_message(message);
-        } else if !self.quiet && self.last_line.get().is_none_or(|last| last.elapsed() > Duration::from_secs(5)) {
+        } else if !self.quiet
+            && self.last_line.get().is_none_or(|last| last.elapsed() > Duration::from_secs(5))
+        {
             eprintln!("{:3.0} %: {message}", part * 100.0);
             self.last_line.set(Some(Instant::now()));
         }

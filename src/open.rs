@@ -139,7 +139,12 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
 const PROBE: UVec2 = UVec2::new(96, 64);
 const PROBE_SAMPLES: u32 = 4;
 
-fn choose_camera(world: &mut World, report: &LoadReport, scene: &str, wishes: &Wishes) -> Result<(), OpenError> {
+fn choose_camera(
+    world: &mut World,
+    report: &LoadReport,
+    scene: &str,
+    wishes: &Wishes,
+) -> Result<(), OpenError> {
     if let Some(wanted) = &wishes.camera {
         let by_name = report.cameras.iter().find(|(name, _)| name == wanted);
         let by_number = || report.cameras.get(wanted.parse::<usize>().ok()?);
@@ -152,7 +157,11 @@ fn choose_camera(world: &mut World, report: &LoadReport, scene: &str, wishes: &W
         world.insert_resource(ActiveCamera(*camera));
     }
     let pose = &wishes.pose;
-    if pose.position.is_none() && pose.focal_point.is_none() && pose.view_up.is_none() && pose.view_angle.is_none() {
+    if pose.position.is_none()
+        && pose.focal_point.is_none()
+        && pose.view_up.is_none()
+        && pose.view_angle.is_none()
+    {
         return Ok(());
     }
     // The file's camera stays what it is; this is one more, standing where it stands.

@@ -2,8 +2,8 @@
 
 use crate::app::{FrameBudget, FrameStats};
 use crate::image::{Display, ImageError, save};
-use crate::open::{OpenError, Opened, Wishes, open};
 use crate::load::{LoadOptions, SceneSource};
+use crate::open::{OpenError, Opened, Wishes, open};
 use crate::trace::{Film, Integrator, RayCounts, RenderSettings};
 use serde::Serialize;
 use std::path::PathBuf;

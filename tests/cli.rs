@@ -35,7 +35,8 @@ fn fresh(test: &str) -> PathBuf {
 #[test]
 fn a_render_writes_what_is_asked_for_and_says_what_it_did() {
     let folder = fresh("render");
-    let arguments = ["render", "cornell", "-o", "a.png", "-o", "a.exr", "--spp", "4", "--resolution", "48x32", "--json"];
+    let arguments =
+        ["render", "cornell", "-o", "a.png", "-o", "a.exr", "--spp", "4", "--resolution", "48x32", "--json"];
     let output = penumbra(&folder, &arguments);
     assert_eq!(output.status.code(), Some(0));
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -49,7 +50,10 @@ fn a_render_writes_what_is_asked_for_and_says_what_it_did() {
     }
     assert_eq!(image::open(folder.join("a.png")).unwrap().dimensions(), (48, 32));
     let exr = image::open(folder.join("a.exr")).unwrap();
-    assert!(matches!(exr, image::DynamicImage::ImageRgb32F(_)) || matches!(exr, image::DynamicImage::ImageRgba32F(_)));
+    assert!(
+        matches!(exr, image::DynamicImage::ImageRgb32F(_))
+            || matches!(exr, image::DynamicImage::ImageRgba32F(_))
+    );
     let left: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|f| f.unwrap().file_name()).collect();
     assert_eq!(left.len(), 2, "no half-written files: {left:?}");
 }
@@ -90,7 +94,11 @@ fn exit_codes_are_those_of_the_documentation() {
         (vec!["render", "draco.gltf", "-o", "a.png"], 3, vec!["draco.gltf", "KHR_draco_mesh_compression"]),
         (vec!["render", "cornel", "-o", "a.png"], 3, vec!["cornel", "did you mean", "cornell"]),
         (vec!["nothing.glb"], 3, vec!["nothing.glb"]),
-        (vec!["render", "cornell", "--scene-settings", "wrong.toml", "-o", "a.png"], 3, vec!["wrong.toml", "line"]),
+        (
+            vec!["render", "cornell", "--scene-settings", "wrong.toml", "-o", "a.png"],
+            3,
+            vec!["wrong.toml", "line"],
+        ),
         (vec!["render", "cornell", "-o", "a.jpg"], 2, vec!["a.jpg", ".png", ".exr"]),
         (vec!["render", "cornell", "--camera", "nobody", "-o", "a.png"], 2, vec!["nobody"]),
         (vec!["render", "cornell", "--resolution", "0x0"], 2, vec!["0x0"]),
@@ -140,8 +148,12 @@ fn a_time_limit_ends_the_render_with_a_picture() {
     let output = penumbra(&folder, &arguments);
     assert_eq!(output.status.code(), Some(0), "no target was set, so none was missed");
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(json["render_seconds"].as_f64().unwrap() < 3.0 && json["samples"].as_f64().unwrap() > 0.0, "{json}");
-    let output = penumbra(&folder, &["render", "cornell", "-o", "b.png", "--time-limit", "0.2", "--spp", "100000"]);
+    assert!(
+        json["render_seconds"].as_f64().unwrap() < 3.0 && json["samples"].as_f64().unwrap() > 0.0,
+        "{json}"
+    );
+    let output =
+        penumbra(&folder, &["render", "cornell", "-o", "b.png", "--time-limit", "0.2", "--spp", "100000"]);
     assert_eq!(output.status.code(), Some(4), "stopped before the target");
     assert!(folder.join("b.png").is_file());
 }
@@ -170,7 +182,8 @@ fn an_interruption_saves_what_there_is() {
 fn compare_measures_and_judges() {
     let folder = fresh("compare");
     for (name, spp) in [("rough.png", "2"), ("fine.exr", "32")] {
-        let arguments = ["render", "cornell", "--resolution", "32x32", "--exposure", "0", "-q", "-o", name, "--spp", spp];
+        let arguments =
+            ["render", "cornell", "--resolution", "32x32", "--exposure", "0", "-q", "-o", name, "--spp", spp];
         assert_eq!(penumbra(&folder, &arguments).status.code(), Some(0));
     }
     let (code, out, _) = run("compare", &["compare", "fine.exr", "fine.exr", "--json"]);
@@ -198,7 +211,8 @@ fn built_in_scenes_are_listed_and_open() {
         assert!(names.contains(&name), "{name} in {out}");
     }
     for name in names {
-        let (code, out, said) = run("list", &["render", name, "--spp", "1", "--resolution", "32x18", "--json", "-q"]);
+        let (code, out, said) =
+            run("list", &["render", name, "--spp", "1", "--resolution", "32x18", "--json", "-q"]);
         assert_eq!(code, Some(0), "{name}: {said}");
         let json: Value = serde_json::from_str(&out).unwrap();
         assert_eq!(json["dropped_samples"], 0, "{name}");
@@ -208,9 +222,13 @@ fn built_in_scenes_are_listed_and_open() {
 
 #[test]
 fn camera_flags_move_the_camera() {
-    let (_, one, _) = run("camera", &["render", "bust", "--resolution", "24x24", "--spp", "2", "-q", "-o", "a.exr", "--json"]);
+    let (_, one, _) = run(
+        "camera",
+        &["render", "bust", "--resolution", "24x24", "--spp", "2", "-q", "-o", "a.exr", "--json"],
+    );
     assert!(!one.is_empty());
-    let away = ["--camera-position", "0,1,-9", "--camera-focal-point", "0,1,-20", "--camera-view-angle", "30"];
+    let away =
+        ["--camera-position", "0,1,-9", "--camera-focal-point", "0,1,-20", "--camera-view-angle", "30"];
     let mut arguments = vec!["render", "bust", "--resolution", "24x24", "--spp", "2", "-q", "-o", "b.exr"];
     arguments.extend(away);
     assert_eq!(run("camera", &arguments).0, Some(0));

@@ -15,44 +15,20 @@ use std::time::Duration;
 fn stage() -> Stage {
     let mut stage = Stage::new(settings(53, 37, Integrator::Path, 5));
     let place = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
-    let glossy = Glossy::Ggx {
-        metallic: 0.3,
-        roughness: 0.4,
-        texture: None,
-    };
-    let floor = Material {
-        glossy,
-        ..Material::default()
-    };
+    let glossy = Glossy::Ggx { metallic: 0.3, roughness: 0.4, texture: None };
+    let floor = Material { glossy, ..Material::default() };
     stage.add_mesh(
         quad(Vec3::new(-3.0, -1.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0),
         floor,
         DAffine3::IDENTITY,
     );
-    let glass = Some(Glass {
-        ior: 1.5,
-        tint: Vec3::ONE,
-    });
-    stage.add_mesh(
-        ball(8),
-        Material {
-            glass,
-            ..Material::lambert(Vec3::ZERO)
-        },
-        place(1.2, 0.0, 0.0),
-    );
-    let veil = Material {
-        alpha: Alpha::Blend,
-        opacity: 0.5,
-        ..Material::default()
-    };
+    let glass = Some(Glass { ior: 1.5, tint: Vec3::ONE });
+    stage.add_mesh(ball(8), Material { glass, ..Material::lambert(Vec3::ZERO) }, place(1.2, 0.0, 0.0));
+    let veil = Material { alpha: Alpha::Blend, opacity: 0.5, ..Material::default() };
     stage.add_mesh(ball(8), veil, place(-1.2, 0.0, 0.0));
     for i in 0..12 {
         stage.add(
-            Light::Sphere {
-                radius: 0.1,
-                radiance: Vec3::splat(5.0),
-            },
+            Light::Sphere { radius: 0.1, radiance: Vec3::splat(5.0) },
             place(f64::from(i) * 0.4 - 2.0, 2.0, 1.0),
         );
     }
@@ -72,11 +48,7 @@ fn until_done(stage: &mut Stage, samples: u32) -> Film {
             return stage.film().clone();
         }
     }
-    panic!(
-        "{} samples are never reached: {}",
-        samples,
-        stage.film().mean_samples()
-    );
+    panic!("{} samples are never reached: {}", samples, stage.film().mean_samples());
 }
 
 fn reference() -> Film {
@@ -86,10 +58,7 @@ fn reference() -> Film {
 #[test]
 fn any_number_of_threads_makes_the_same_film() {
     let films = [1, 2, 8].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(reference)
     });
     assert!(films[0] == films[1] && films[0] == films[2]);
@@ -102,10 +71,7 @@ fn any_way_of_parting_the_samples_makes_the_same_film() {
     for pass_samples in [1, 3, 32, 1000, u32::MAX] {
         let mut stage = stage();
         budget(&mut stage, |b| b.pass_samples = pass_samples);
-        assert!(
-            until_done(&mut stage, 32) == reference,
-            "{pass_samples} at once"
-        );
+        assert!(until_done(&mut stage, 32) == reference, "{pass_samples} at once");
     }
     let mut stage = stage();
     budget(&mut stage, |b| b.pass_samples = 8);
@@ -117,11 +83,7 @@ fn any_way_of_parting_the_samples_makes_the_same_film() {
 fn another_seed_and_another_sample_make_other_films() {
     let reference = reference();
     let mut stage = stage();
-    stage
-        .app
-        .world
-        .resource_mut::<penumbra::trace::RenderSettings>()
-        .seed = 1;
+    stage.app.world.resource_mut::<penumbra::trace::RenderSettings>().seed = 1;
     assert!(until_done(&mut stage, 32) != reference);
     assert!(until_done(&mut stage, 33) != reference);
 }
@@ -137,12 +99,7 @@ fn passes_broken_off_anywhere_and_resumed_make_the_same_film() {
     for i in 0..100_000 {
         // Now and then somebody has pressed a key: nothing at all is traced.
         let pressed = i % 7 == 3;
-        stage
-            .app
-            .world
-            .resource::<FrameBudget>()
-            .interrupt
-            .store(pressed, Ordering::Relaxed);
+        stage.app.world.resource::<FrameBudget>().interrupt.store(pressed, Ordering::Relaxed);
         let before = stage.film().mean_samples();
         stage.app.frame();
         let film = stage.film();
@@ -181,10 +138,7 @@ fn a_key_pressed_in_the_middle_of_a_pass_changes_nothing() {
 #[test]
 fn the_last_sample_indices_there_are_come_to_an_end() {
     let mut stage = stage();
-    stage
-        .app
-        .world
-        .insert_resource(Film::new(UVec2::new(53, 37), u32::MAX - 4));
+    stage.app.world.insert_resource(Film::new(UVec2::new(53, 37), u32::MAX - 4));
     let film = until_done(&mut stage, 64);
     assert_eq!(film.complete_samples(), 4);
 }

@@ -8,8 +8,8 @@ use glam::{DVec3, UVec2, Vec2, Vec3};
 use penumbra::app::{App, Frame, FrameBudget, FrameStats};
 use penumbra::image::{Display, Picture};
 use penumbra::scene::{
-    ActiveCamera, Camera, Encoding, Filter, Instance, Light, Material, Mesh, Texels, Texture, Transform, TriangleMesh,
-    Visible, Wrap,
+    ActiveCamera, Camera, Encoding, Filter, Instance, Light, Material, Mesh, Texels, Texture, Transform,
+    TriangleMesh, Visible, Wrap,
 };
 use penumbra::sync::Redone;
 use penumbra::trace::{Film, Integrator, RenderSettings};
@@ -105,7 +105,10 @@ impl Stage {
         self.app.world.resource::<Film>()
     }
 
-    fn get_mut<T: Component<Mutability = bevy_ecs::component::Mutable>>(&mut self, entity: Entity) -> Mut<'_, T> {
+    fn get_mut<T: Component<Mutability = bevy_ecs::component::Mutable>>(
+        &mut self,
+        entity: Entity,
+    ) -> Mut<'_, T> {
         self.app.world.get_mut::<T>(entity).unwrap()
     }
 }
@@ -143,7 +146,11 @@ fn a_moved_instance_touches_the_top_level_only() {
     let floor = stage.floor;
     assert_eq!(stage.redone_by(|s| s.get_mut::<Transform>(floor).0.translation.y = -0.1), top_level);
     let group = stage.group;
-    assert_eq!(stage.redone_by(|s| s.get_mut::<Transform>(group).0.translation.x = 0.2), top_level, "by its parent");
+    assert_eq!(
+        stage.redone_by(|s| s.get_mut::<Transform>(group).0.translation.x = 0.2),
+        top_level,
+        "by its parent"
+    );
     let floating = stage.floating;
     let world = |s: &mut Stage| {
         s.app.world.entity_mut(floating).remove::<ChildOf>();
@@ -162,7 +169,11 @@ fn instances_come_and_go_at_the_top_level() {
         s.app.world.spawn(Instance { mesh, materials: vec![] });
     };
     assert_eq!(stage.redone_by(spawn), top_level);
-    assert_eq!(stage.redone_by(|s| assert!(s.app.world.despawn(mesh))), top_level, "a mesh, with both its instances");
+    assert_eq!(
+        stage.redone_by(|s| assert!(s.app.world.despawn(mesh))),
+        top_level,
+        "a mesh, with both its instances"
+    );
     assert_eq!(stage.app.world.resource::<penumbra::trace::Geometry>().instances.len(), 0);
 }
 

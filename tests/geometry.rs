@@ -84,7 +84,11 @@ fn same_as_brute_force(name: &str, triangles: &[[Vec3; 3]], rays: usize) {
             let short = Ray { t_max: hit.t, ..ray };
             assert!(blas.any_hit(&short), "{name}: t_max itself counts");
             let shorter = Ray { t_max: hit.t.next_down(), ..ray };
-            assert_eq!(blas.any_hit(&shorter), brute_force(triangles, &shorter).is_some(), "{name}: just before");
+            assert_eq!(
+                blas.any_hit(&shorter),
+                brute_force(triangles, &shorter).is_some(),
+                "{name}: just before"
+            );
         }
     }
 }
@@ -158,7 +162,9 @@ fn pathological_geometry_agrees_with_brute_force_and_keeps_its_bounds() {
 #[test]
 fn far_and_small_scenes_agree_with_brute_force() {
     for scale in [1e-3, 1.0, 1e3] {
-        for shift in [Vec3::ZERO, Vec3::splat(1e3), Vec3::splat(1e5), Vec3::new(148_376.0, 1234.0, -223_423.0)] {
+        for shift in
+            [Vec3::ZERO, Vec3::splat(1e3), Vec3::splat(1e5), Vec3::new(148_376.0, 1234.0, -223_423.0)]
+        {
             let mut triangles: Vec<_> =
                 soup(400, 0.3, 21).into_iter().map(|t| t.map(|p| p * scale + shift)).collect();
             // Rounded to f32 some collapse to a line, which has no surface.
@@ -246,7 +252,9 @@ fn zero_direction_components_miss_nothing() {
         let p = |dx: i32, dy: i32, dz: i32| Vec3::new((x + dx) as f32, (y + dy) as f32, (z + dz) as f32);
         let [a, b, c, d] = [p(0, 0, 0), p(1, 0, 0), p(1, 1, 0), p(0, 1, 0)];
         let [e, f, g, h] = [p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)];
-        for [p, q, r, s] in [[a, b, c, d], [e, f, g, h], [a, b, f, e], [d, c, g, h], [a, d, h, e], [b, c, g, f]] {
+        for [p, q, r, s] in
+            [[a, b, c, d], [e, f, g, h], [a, b, f, e], [d, c, g, h], [a, d, h, e], [b, c, g, f]]
+        {
             triangles.extend([[p, q, r], [p, r, s]]);
         }
     }
@@ -258,7 +266,8 @@ fn zero_direction_components_miss_nothing() {
             continue;
         }
         for negative_zero in [false, true] {
-            let direction = if negative_zero { direction.map(|c| if c == 0.0 { -0.0 } else { c }) } else { direction };
+            let direction =
+                if negative_zero { direction.map(|c| if c == 0.0 { -0.0 } else { c }) } else { direction };
             // Every seventh of the 21³ origins: brute force over 1,800 triangles is slow.
             for o in (d % 7..9261).step_by(7 * 5) {
                 let origin = Vec3::new((o % 21) as f32, (o / 21 % 21) as f32, (o / 441) as f32) * 0.5 - 1.0;
@@ -320,7 +329,8 @@ fn instances_agree_with_each_alone() {
     let meshes: Vec<_> = (0..4).map(|i| soup(200, 0.4, 100 + i)).collect();
     let placements: Vec<_> = (0..40)
         .map(|i| {
-            let rotation = DQuat::from_axis_angle(rng.direction().as_dvec3().normalize(), f64::from(rng.unit()) * 6.0);
+            let rotation =
+                DQuat::from_axis_angle(rng.direction().as_dvec3().normalize(), f64::from(rng.unit()) * 6.0);
             let scale = DVec3::new(1.0, 0.3, if i % 3 == 0 { -2.0 } else { 1.5 });
             let at = rng.vec().as_dvec3() * 8.0;
             place(&meshes[i % 4], DAffine3::from_scale_rotation_translation(scale, rotation, at))
@@ -351,7 +361,8 @@ fn no_ray_leaks_out_of_a_closed_instance() {
     let mut rng = Rng(23);
     let mut leaks = 0;
     for _ in 0..200 {
-        let rotation = DQuat::from_axis_angle(rng.direction().as_dvec3().normalize(), f64::from(rng.unit()) * 6.0);
+        let rotation =
+            DQuat::from_axis_angle(rng.direction().as_dvec3().normalize(), f64::from(rng.unit()) * 6.0);
         let scale = DVec3::from_array([(); 3].map(|()| 10f64.powf(f64::from(rng.unit()) * 4.0 - 2.0)));
         let at = rng.vec().as_dvec3() * 10f64.powf(f64::from(rng.unit()) * 8.0 - 4.0);
         let placed = DAffine3::from_scale_rotation_translation(scale, rotation, at);

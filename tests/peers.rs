@@ -31,8 +31,12 @@ fn convert(peers: &Path, name: &str, folder: &Path) -> PathBuf {
         let flat = folder.join(format!("{name}-{}", file.file_name().unwrap().to_string_lossy()));
         let text = std::fs::read_to_string(&file).unwrap();
         std::fs::write(&flat, flat_obj(&text)).unwrap();
-        writeln!(toml, "[[model]]\nfile = {:?}\nmaterial = {}\nmatrix = {}", flat, mesh["material"], mesh["transform"])
-            .unwrap();
+        writeln!(
+            toml,
+            "[[model]]\nfile = {:?}\nmaterial = {}\nmatrix = {}",
+            flat, mesh["material"], mesh["transform"]
+        )
+        .unwrap();
     }
     for light in scene["lights"].as_array().unwrap() {
         writeln!(toml, "[[light]]\nkind = \"parallelogram\"").unwrap();
@@ -41,8 +45,12 @@ fn convert(peers: &Path, name: &str, folder: &Path) -> PathBuf {
         }
     }
     let camera = &scene["camera"];
-    writeln!(toml, "[camera]\nposition = {}\ntarget = {}\nup = {}", camera["eye"], camera["target"], camera["up"])
-        .unwrap();
+    writeln!(
+        toml,
+        "[camera]\nposition = {}\ntarget = {}\nup = {}",
+        camera["eye"], camera["target"], camera["up"]
+    )
+    .unwrap();
     writeln!(toml, "vertical_fov = {}", camera["vfov_deg"]).unwrap();
     writeln!(toml, "[render]\nresolution = [{}, {}]", camera["width"], camera["height"]).unwrap();
     let path = folder.join(format!("{name}.toml"));
@@ -122,12 +130,17 @@ fn against_reference_with(peers: &Path, name: &str, mode: &str, runs: u32, spp: 
     let mut keep = Vec::new();
     for run in 0..runs {
         app.world.insert_resource(Film::new(size, run * spp));
-        app.world.insert_resource(FrameBudget { sample_target: spp, pass_samples: spp, ..FrameBudget::default() });
+        app.world.insert_resource(FrameBudget {
+            sample_target: spp,
+            pass_samples: spp,
+            ..FrameBudget::default()
+        });
         app.frame();
         if keep.is_empty() {
             keep = mask(app.world.resource::<Lights>(), app.world.resource::<Viewpoint>(), size);
         }
-        let pixels: Vec<Vec3> = linear_pixels(app.world.resource::<Film>()).iter().map(|p| *p * gain).collect();
+        let pixels: Vec<Vec3> =
+            linear_pixels(app.world.resource::<Film>()).iter().map(|p| *p * gain).collect();
         let mut tiles = vec![(0.0, 0.0); tiles_x * tiles_y];
         for (i, (p, r)) in pixels.iter().zip(&reference.pixels).enumerate() {
             sum[i] += *p;
@@ -174,7 +187,10 @@ fn against_reference_with(peers: &Path, name: &str, mode: &str, runs: u32, spp: 
     let film = app.world.resource::<Film>();
     penumbra::image::save(&folder.join(format!("{name}.{mode}.png")), film, &Default::default()).unwrap();
     let outcome = Outcome { rmse: (square / count).sqrt(), bias: bias / count, worst_tile };
-    println!("{name} {mode}: RMSE {:.2e}, bias {:+.1e}, worst tile {:.1} sigma", outcome.rmse, outcome.bias, outcome.worst_tile);
+    println!(
+        "{name} {mode}: RMSE {:.2e}, bias {:+.1e}, worst tile {:.1} sigma",
+        outcome.rmse, outcome.bias, outcome.worst_tile
+    );
     outcome
 }
 

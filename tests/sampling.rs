@@ -31,9 +31,7 @@ fn normal_tail(z: f64) -> f64 {
     let n = 2000;
     let h = 12.0 / f64::from(n);
     let f = |i: i32| (-0.5 * (z + f64::from(i) * h).powi(2)).exp();
-    let sum: f64 = (0..n / 2)
-        .map(|i| f(2 * i) + 4.0 * f(2 * i + 1) + f(2 * i + 2))
-        .sum();
+    let sum: f64 = (0..n / 2).map(|i| f(2 * i) + 4.0 * f(2 * i + 1) + f(2 * i + 2)).sum();
     sum * h / 3.0 / (2.0 * PI).sqrt()
 }
 
@@ -53,10 +51,7 @@ fn chi_square(name: &str, seen: &[f64], expected: &[f64]) {
         chi2 += (rare_seen - rare_expected).powi(2) / rare_expected;
         cells += 1.0;
     } else {
-        assert!(
-            rare_seen <= rare_expected + 30.0,
-            "{name}: {rare_seen} where {rare_expected} are expected"
-        );
+        assert!(rare_seen <= rare_expected + 30.0, "{name}: {rare_seen} where {rare_expected} are expected");
     }
     assert!(cells > 1.0, "{name}: nothing to compare");
     let k = 2.0 / (9.0 * (cells - 1.0));
@@ -64,10 +59,7 @@ fn chi_square(name: &str, seen: &[f64], expected: &[f64]) {
     let p = normal_tail(z);
     let level = 1.0 - 0.99f64.powf(1.0 / TESTS);
     println!("{name}: χ² {chi2:.0} of {cells} cells, p = {p:.2e}");
-    assert!(
-        p > level,
-        "{name}: χ² {chi2} of {cells} cells, p = {p:e} < {level:e}"
-    );
+    assert!(p > level, "{name}: χ² {chi2} of {cells} cells, p = {p:e} < {level:e}");
 }
 
 /// A sampler against its density, on cells of a unit square that is mapped onto directions.
@@ -100,14 +92,9 @@ fn sampler_against_density(
             let (i, j) = (cell / CELLS, cell % CELLS);
             let mut sum = 0.0;
             for (k, l) in (0..FINE).flat_map(|k| (0..FINE).map(move |l| (k, l))) {
-                let at =
-                    |i: usize, k: usize| (i as f64 + (k as f64 + 0.5) / FINE as f64) / CELLS as f64;
+                let at = |i: usize, k: usize| (i as f64 + (k as f64 + 0.5) / FINE as f64) / CELLS as f64;
                 let (wi, area) = direction(at(i, k), at(j, l));
-                sum += if area > 0.0 {
-                    density(wi.as_vec3()) * area
-                } else {
-                    0.0
-                };
+                sum += if area > 0.0 { density(wi.as_vec3()) * area } else { 0.0 };
             }
             sum / ((FINE * FINE * CELLS * CELLS) as f64) * samples as f64
         })
@@ -121,20 +108,13 @@ fn sampler_against_density(
 const POINT: Vec3 = Vec3::new(0.2, -0.1, 0.05);
 
 fn shape(shape: Shape) -> ShapeLight {
-    ShapeLight {
-        shape,
-        radiance: [Vec3::ONE; 4],
-        two_sided: true,
-        visible: true,
-    }
+    ShapeLight { shape, radiance: [Vec3::ONE; 4], two_sided: true, visible: true }
 }
 
 /// What a ray toward `wi` finds the density to be.
 fn hit_density(light: &ShapeLight, wi: Vec3) -> f64 {
     let ray = Ray::new(POINT, wi);
-    light
-        .intersect(&ray)
-        .map_or(0.0, |hit| f64::from(light.emitted(&ray, &hit).1))
+    light.intersect(&ray).map_or(0.0, |hit| f64::from(light.emitted(&ray, &hit).1))
 }
 
 fn light_sample(light: &FlatLight, rng: &mut Rng, density: &impl Fn(Vec3) -> f64) -> Option<Vec3> {
@@ -152,25 +132,16 @@ fn light_sample(light: &FlatLight, rng: &mut Rng, density: &impl Fn(Vec3) -> f64
 fn cone_map(
     axis: DVec3,
     one_minus_cos: f64,
-) -> (
-    impl Fn(f64, f64) -> (DVec3, f64),
-    impl Fn(DVec3) -> (f64, f64),
-) {
+) -> (impl Fn(f64, f64) -> (DVec3, f64), impl Fn(DVec3) -> (f64, f64)) {
     let (x, y) = axis.any_orthonormal_pair();
     let direction = move |a: f64, b: f64| {
         let cos = 1.0 - a * one_minus_cos;
         let (sin, phi) = ((1.0 - cos * cos).max(0.0).sqrt(), 2.0 * PI * b);
-        (
-            x * (sin * phi.cos()) + y * (sin * phi.sin()) + axis * cos,
-            2.0 * PI * one_minus_cos,
-        )
+        (x * (sin * phi.cos()) + y * (sin * phi.sin()) + axis * cos, 2.0 * PI * one_minus_cos)
     };
     let place = move |d: DVec3| {
         let a = 0.5 * (d.normalize() - axis).length_squared() / one_minus_cos;
-        (
-            a.clamp(0.0, 1.0),
-            (d.dot(y).atan2(d.dot(x)) / (2.0 * PI)).rem_euclid(1.0),
-        )
+        (a.clamp(0.0, 1.0), (d.dot(y).atan2(d.dot(x)) / (2.0 * PI)).rem_euclid(1.0))
     };
     (direction, place)
 }
@@ -179,11 +150,7 @@ fn cone_map(
 fn each_light_is_sampled_as_its_density_says() {
     let from = POINT.as_dvec3();
     // A parallelogram, by its own coordinates.
-    let (corner, u, v) = (
-        Vec3::new(-0.3, -0.5, 0.6),
-        Vec3::new(1.0, 0.2, 0.4),
-        Vec3::new(-0.1, 0.8, 0.3),
-    );
+    let (corner, u, v) = (Vec3::new(-0.3, -0.5, 0.6), Vec3::new(1.0, 0.2, 0.4), Vec3::new(-0.1, 0.8, 0.3));
     let (c, du, dv) = (corner.as_dvec3(), u.as_dvec3(), v.as_dvec3());
     let normal = du.cross(dv);
     let onto = move |a: f64, b: f64| {
@@ -193,10 +160,7 @@ fn each_light_is_sampled_as_its_density_says() {
     let back = move |d: DVec3| {
         let p = from + d * ((c - from).dot(normal) / d.dot(normal)) - c;
         let inverse = 1.0 / normal.length_squared();
-        let (a, b) = (
-            p.cross(dv).dot(normal) * inverse,
-            du.cross(p).dot(normal) * inverse,
-        );
+        let (a, b) = (p.cross(dv).dot(normal) * inverse, du.cross(p).dot(normal) * inverse);
         (a.clamp(0.0, 1.0), b.clamp(0.0, 1.0))
     };
     let light = shape(Shape::Parallelogram { corner, u, v });
@@ -211,10 +175,7 @@ fn each_light_is_sampled_as_its_density_says() {
         back,
     );
     // The same as two triangles of a mesh, cut at its diagonal; cells are those of the parallelogram.
-    let corners = vec![
-        [corner, corner + u, corner + u + v],
-        [corner, corner + u + v, corner + v],
-    ];
+    let corners = vec![[corner, corner + u, corner + u + v], [corner, corner + u + v, corner + v]];
     let mesh = MeshLight {
         triangles: vec![3, 7],
         corners,
@@ -227,11 +188,7 @@ fn each_light_is_sampled_as_its_density_says() {
         let (a, b) = back(d);
         let distance = (c - from).dot(normal) / d.dot(normal);
         let cos = normal.normalize().dot(d).abs();
-        f64::from(mesh.pdf(
-            if a > b { 3 } else { 7 },
-            (distance * distance) as f32,
-            cos as f32,
-        ))
+        f64::from(mesh.pdf(if a > b { 3 } else { 7 }, (distance * distance) as f32, cos as f32))
     };
     let flat = FlatLight::Mesh(mesh.clone());
     sampler_against_density(
@@ -243,22 +200,10 @@ fn each_light_is_sampled_as_its_density_says() {
         back,
     );
     // A disk, by squared radius and angle.
-    let (center, facing, radius) = (
-        Vec3::new(0.4, 0.3, 0.9),
-        Vec3::new(0.3, -0.5, -0.8).normalize(),
-        0.7f32,
-    );
-    let (dc, n, r) = (
-        center.as_dvec3(),
-        facing.as_dvec3().normalize(),
-        f64::from(radius),
-    );
+    let (center, facing, radius) = (Vec3::new(0.4, 0.3, 0.9), Vec3::new(0.3, -0.5, -0.8).normalize(), 0.7f32);
+    let (dc, n, r) = (center.as_dvec3(), facing.as_dvec3().normalize(), f64::from(radius));
     let (x, y) = n.any_orthonormal_pair();
-    let light = shape(Shape::Disk {
-        center,
-        normal: facing,
-        radius,
-    });
+    let light = shape(Shape::Disk { center, normal: facing, radius });
     let density = |wi: Vec3| hit_density(&light, wi);
     let flat = FlatLight::Shape(light.clone());
     sampler_against_density(
@@ -269,10 +214,7 @@ fn each_light_is_sampled_as_its_density_says() {
         |a, b| {
             let (rho, phi) = (r * a.sqrt(), 2.0 * PI * b);
             let to = dc + x * (rho * phi.cos()) + y * (rho * phi.sin()) - from;
-            (
-                to.normalize(),
-                PI * r * r * n.dot(to).abs() / to.length().powi(3),
-            )
+            (to.normalize(), PI * r * r * n.dot(to).abs() / to.length().powi(3))
         },
         |d| {
             let p = from + d * ((dc - from).dot(n) / d.dot(n)) - dc;
@@ -291,11 +233,7 @@ fn each_light_is_sampled_as_its_density_says() {
         let flat = FlatLight::Shape(light.clone());
         let to = center.as_dvec3() - from;
         let sin2 = (f64::from(radius) / to.length()).powi(2);
-        let spread = if sin2 < 1.0 {
-            sin2 / (1.0 + (1.0 - sin2).sqrt())
-        } else {
-            2.0
-        };
+        let spread = if sin2 < 1.0 { sin2 / (1.0 + (1.0 - sin2).sqrt()) } else { 2.0 };
         let (direction, place) = cone_map(to.normalize(), spread);
         sampler_against_density(
             name,
@@ -310,15 +248,8 @@ fn each_light_is_sampled_as_its_density_says() {
     let axis = Vec3::new(0.3, -0.4, -0.7).normalize();
     for angle in [0.0093, 0.5, 2.0f64] {
         let sin2_radius = (0.5 * angle).sin().powi(2) as f32;
-        let sun = FlatLight::Directional {
-            axis,
-            irradiance: Vec3::ONE,
-            sin2_radius,
-        };
-        let density = |wi: Vec3| {
-            sun.beyond(Vec3::Z, wi)
-                .map_or(0.0, |(_, pdf)| f64::from(pdf))
-        };
+        let sun = FlatLight::Directional { axis, irradiance: Vec3::ONE, sin2_radius };
+        let density = |wi: Vec3| sun.beyond(Vec3::Z, wi).map_or(0.0, |(_, pdf)| f64::from(pdf));
         let (direction, place) = cone_map(-axis.as_dvec3().normalize(), 1.0 - (0.5 * angle).cos());
         let name = format!("sun {angle} rad wide");
         sampler_against_density(
@@ -330,13 +261,8 @@ fn each_light_is_sampled_as_its_density_says() {
             place,
         );
     }
-    let sky = FlatLight::Environment {
-        radiance: Vec3::ONE,
-    };
-    let density = |wi: Vec3| {
-        sky.beyond(Vec3::Z, wi)
-            .map_or(0.0, |(_, pdf)| f64::from(pdf))
-    };
+    let sky = FlatLight::Environment { radiance: Vec3::ONE };
+    let density = |wi: Vec3| sky.beyond(Vec3::Z, wi).map_or(0.0, |(_, pdf)| f64::from(pdf));
     let (direction, place) = cone_map(DVec3::Z, 1.0);
     sampler_against_density(
         "sky",
@@ -366,15 +292,8 @@ fn bsdf(material: Material) -> Bsdf {
 
 #[test]
 fn each_material_is_sampled_as_its_density_says() {
-    let ggx = |metallic, roughness| Glossy::Ggx {
-        metallic,
-        roughness,
-        texture: None,
-    };
-    let phong = |exponent| Glossy::BlinnPhong {
-        specular: Vec3::splat(0.7),
-        exponent,
-    };
+    let ggx = |metallic, roughness| Glossy::Ggx { metallic, roughness, texture: None };
+    let phong = |exponent| Glossy::BlinnPhong { specular: Vec3::splat(0.7), exponent };
     // `width`: tangent of the typical angle between the normal and the half vector.
     for (name, glossy, albedo, width) in [
         ("Lambert", Glossy::None, 0.8, 1.0),
@@ -387,10 +306,7 @@ fn each_material_is_sampled_as_its_density_says() {
         ("Blinn-Phong of exponent 50", phong(50.0), 0.0, 0.2),
         ("Blinn-Phong over Lambert", phong(5.0), 0.4, 0.6),
     ] {
-        let bsdf = bsdf(Material {
-            glossy,
-            ..Material::lambert(Vec3::splat(albedo))
-        });
+        let bsdf = bsdf(Material { glossy, ..Material::lambert(Vec3::splat(albedo)) });
         for degrees in [0.0, 30.0, 60.0, 80.0, 89.9f64] {
             let eye = DVec3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
             let wo = eye.as_vec3().normalize();
@@ -410,32 +326,20 @@ fn each_material_is_sampled_as_its_density_says() {
             let place = |wi: DVec3| {
                 let h = (wi + eye).normalize();
                 let tan = h.x.hypot(h.y) / h.z;
-                (
-                    tan / (width + tan),
-                    (h.y.atan2(h.x) / (2.0 * PI) - turn).rem_euclid(1.0),
-                )
+                (tan / (width + tan), (h.y.atan2(h.x) / (2.0 * PI) - turn).rem_euclid(1.0))
             };
             let sample = |rng: &mut Rng| {
                 let sample = bsdf.sample(wo, rng.unit(), rng.pair(), Lobes::ALL)?;
                 let pdf = bsdf.pdf(wo, sample.wi, Lobes::ALL);
                 assert_eq!(sample.pdf, Some(pdf));
                 let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
-                let off = (sample.weight * pdf - (diffuse + glossy))
-                    .abs()
-                    .max_element();
-                assert!(
-                    off <= 1e-5 * (diffuse + glossy).max_element(),
-                    "weight is not value over density"
-                );
+                let off = (sample.weight * pdf - (diffuse + glossy)).abs().max_element();
+                assert!(off <= 1e-5 * (diffuse + glossy).max_element(), "weight is not value over density");
                 Some(sample.wi)
             };
             // There one step of a direction's largest component is 0.7 % of the whole lobe: more samples
             // would see the steps of single precision.
-            let samples = if width < 0.005 && degrees > 89.0 {
-                SAMPLES / 8
-            } else {
-                SAMPLES
-            };
+            let samples = if width < 0.005 && degrees > 89.0 { SAMPLES / 8 } else { SAMPLES };
             let density = |wi: Vec3| f64::from(bsdf.pdf(wo, wi, Lobes::ALL));
             sampler_against_density(
                 &format!("{name} at {degrees}°"),
@@ -451,9 +355,7 @@ fn each_material_is_sampled_as_its_density_says() {
 
 #[test]
 fn the_chi_square_finds_a_density_two_percent_wrong() {
-    let sky = FlatLight::Environment {
-        radiance: Vec3::ONE,
-    };
+    let sky = FlatLight::Environment { radiance: Vec3::ONE };
     // cos^1.1 instead of cos: the same everywhere but for a few percent.
     let density = |wi: Vec3| f64::from(wi.z.max(0.0)).powf(1.1) * 2.1 / (2.0 * PI);
     let (direction, place) = cone_map(DVec3::Z, 1.0);
@@ -466,31 +368,16 @@ fn the_chi_square_finds_a_density_two_percent_wrong() {
 
 /// A place in the middle of a penumbra, so small that every pixel shows the same.
 fn flat_penumbra(width: u32, height: u32, strip: f64, seed: u32) -> Stage {
-    let mut stage = Stage::new(RenderSettings {
-        seed,
-        ..settings(width, height, Integrator::Direct, 1)
-    });
+    let mut stage = Stage::new(RenderSettings { seed, ..settings(width, height, Integrator::Direct, 1) });
     let here = DAffine3::IDENTITY;
+    stage.add_mesh(quad(Vec3::new(-2.0, -2.0, 0.0), Vec3::X * 4.0, Vec3::Y * 4.0), Material::default(), here);
     stage.add_mesh(
-        quad(Vec3::new(-2.0, -2.0, 0.0), Vec3::X * 4.0, Vec3::Y * 4.0),
+        quad(Vec3::new(-100.0, -100.0, 1.0), Vec3::X * 100.0, Vec3::Y * 200.0),
         Material::default(),
         here,
     );
-    stage.add_mesh(
-        quad(
-            Vec3::new(-100.0, -100.0, 1.0),
-            Vec3::X * 100.0,
-            Vec3::Y * 200.0,
-        ),
-        Material::default(),
-        here,
-    );
-    let light = Light::Parallelogram {
-        edge_u: Vec3::X,
-        edge_v: Vec3::Y,
-        radiance: [Vec3::ONE; 4],
-        two_sided: true,
-    };
+    let light =
+        Light::Parallelogram { edge_u: Vec3::X, edge_v: Vec3::Y, radiance: [Vec3::ONE; 4], two_sided: true };
     stage.add(light, DAffine3::from_translation(DVec3::Z * 4.0));
     stage.look(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, strip);
     stage
@@ -512,14 +399,8 @@ fn the_noise_of_neighbouring_pixels_is_not_correlated() {
                 sum += at(x, y) * at(x + dx, y + dy);
             }
             let correlation = sum / variance / n;
-            println!(
-                "{samples} samples, {dx} {dy}: {correlation:+.1e} (bound {:.1e})",
-                5.0 / n.sqrt()
-            );
-            assert!(
-                correlation.abs() < 5.0 / n.sqrt(),
-                "{samples} samples: {correlation} at {dx}, {dy}"
-            );
+            println!("{samples} samples, {dx} {dy}: {correlation:+.1e} (bound {:.1e})", 5.0 / n.sqrt());
+            assert!(correlation.abs() < 5.0 / n.sqrt(), "{samples} samples: {correlation} at {dx}, {dy}");
         }
     }
 }
@@ -541,11 +422,7 @@ fn the_noise_estimate_is_the_true_error() {
     let (mut estimated, mut actual) = (Vec::new(), Vec::new());
     for seed in 0..100 {
         let (picture, noise) = scene(seed, 16);
-        let sum: f64 = picture
-            .iter()
-            .zip(&truth)
-            .map(|(p, t)| (p - t).powi(2) / (t * t + floor))
-            .sum();
+        let sum: f64 = picture.iter().zip(&truth).map(|(p, t)| (p - t).powi(2) / (t * t + floor)).sum();
         actual.push((sum / truth.len() as f64).sqrt());
         estimated.push(noise.expect("an estimate"));
     }
@@ -582,9 +459,7 @@ fn a_sample_that_is_no_number_is_dropped_and_counted() {
     // Through the whole way: a light of no number makes each sample drop, and no pixel wrong.
     let mut stage = flat_penumbra(8, 8, 0.5, 0);
     stage.add(
-        Light::Point {
-            intensity: Vec3::splat(f32::NAN),
-        },
+        Light::Point { intensity: Vec3::splat(f32::NAN) },
         DAffine3::from_translation(DVec3::new(1.0, 0.0, 0.5)),
     );
     stage.app.frame();

@@ -10,10 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// The shared folder, or a note that the test did not run.
 fn shared(test: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("PENUMBRA_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-        PathBuf::from,
-    );
+    let root = std::env::var_os("PENUMBRA_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
     if root.join("scenes/README.md").is_file() {
         return Some(root);
     }
@@ -23,11 +21,7 @@ fn shared(test: &str) -> Option<PathBuf> {
 
 fn load_file(path: &Path) -> (World, Result<LoadReport, LoadError>) {
     let mut world = World::new();
-    let result = load(
-        &mut world,
-        &SceneSource::File(path.to_path_buf()),
-        &LoadOptions::default(),
-    );
+    let result = load(&mut world, &SceneSource::File(path.to_path_buf()), &LoadOptions::default());
     (world, result)
 }
 
@@ -40,10 +34,7 @@ fn area(world: &mut World) -> f64 {
             continue;
         };
         for i in 0..mesh.0.triangles.len() {
-            let [a, b, c] = mesh
-                .0
-                .corners(i)
-                .map(|p| transform.0.transform_point3(p.as_dvec3()));
+            let [a, b, c] = mesh.0.corners(i).map(|p| transform.0.transform_point3(p.as_dvec3()));
             sum += 0.5 * (b - a).cross(c - a).length();
         }
     }
@@ -53,39 +44,26 @@ fn area(world: &mut World) -> f64 {
 /// Every promise of the components that the rest of the program relies on.
 fn broken_promise(world: &mut World) -> Option<String> {
     let camera = world.get_resource::<ActiveCamera>().map(|active| active.0);
-    if camera.is_none_or(|camera| {
-        world
-            .get::<GlobalTransform>(camera)
-            .is_none_or(|t| !t.0.is_finite())
-    }) {
+    if camera.is_none_or(|camera| world.get::<GlobalTransform>(camera).is_none_or(|t| !t.0.is_finite())) {
         return Some("no usable active camera".to_owned());
     }
     let bounds = world.get_resource::<SceneBounds>().copied();
-    if bounds.is_none_or(|bounds| {
-        !(bounds.center.is_finite() && bounds.radius > 0.0 && bounds.radius.is_finite())
-    }) {
+    if bounds
+        .is_none_or(|bounds| !(bounds.center.is_finite() && bounds.radius > 0.0 && bounds.radius.is_finite()))
+    {
         return Some(format!("bounds {bounds:?}"));
     }
     for Mesh(mesh) in world.query::<&Mesh>().iter(world) {
         let vertices = mesh.positions.len();
         let lengths = [mesh.normals.len(), mesh.uvs.len(), mesh.colors.len()];
-        if lengths
-            .iter()
-            .any(|&length| length != 0 && length != vertices)
-        {
-            return Some(format!(
-                "attributes of length {lengths:?} for {vertices} vertices"
-            ));
+        if lengths.iter().any(|&length| length != 0 && length != vertices) {
+            return Some(format!("attributes of length {lengths:?} for {vertices} vertices"));
         }
         if !mesh.slots.is_empty() && mesh.slots.len() != mesh.triangles.len() {
             return Some("slots do not match triangles".to_owned());
         }
         for corner in mesh.triangles.iter().flatten() {
-            if mesh
-                .positions
-                .get(*corner as usize)
-                .is_none_or(|p| !p.is_finite())
-            {
+            if mesh.positions.get(*corner as usize).is_none_or(|p| !p.is_finite()) {
                 return Some(format!("vertex {corner} is not there or not finite"));
             }
         }
@@ -126,10 +104,7 @@ fn every_shared_scene_loads_with_its_triangles() {
         match result {
             Err(error) => failures.push(format!("{file}: refused: {error}")),
             Ok(report) if report.triangles != expected => {
-                failures.push(format!(
-                    "{file}: {} triangles, expected {expected}",
-                    report.triangles
-                ));
+                failures.push(format!("{file}: {} triangles, expected {expected}", report.triangles));
             }
             Ok(_) => {
                 failures.extend(broken_promise(&mut world).map(|what| format!("{file}: {what}")));
@@ -137,12 +112,7 @@ fn every_shared_scene_loads_with_its_triangles() {
         }
     }
     assert!(rows >= 60, "only {rows} rows in the table");
-    assert!(
-        failures.is_empty(),
-        "{} of {rows} failed:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
+    assert!(failures.is_empty(), "{} of {rows} failed:\n{}", failures.len(), failures.join("\n"));
 }
 
 /// One row of an expectation table.
@@ -159,27 +129,18 @@ fn says(message: &str, pattern: &str) -> bool {
     let message = message.to_lowercase();
     let one = |words: &str| {
         let mut rest = message.as_str();
-        words
-            .to_lowercase()
-            .replace("\\.", "\u{1}")
-            .replace("e?", "")
-            .split(".*")
-            .all(|part| {
-                let part = part.replace('\u{1}', ".");
-                let found = rest.find(&part);
-                rest = found.map_or("", |at| &rest[at + part.len()..]);
-                found.is_some()
-            })
+        words.to_lowercase().replace("\\.", "\u{1}").replace("e?", "").split(".*").all(|part| {
+            let part = part.replace('\u{1}', ".");
+            let found = rest.find(&part);
+            rest = found.map_or("", |at| &rest[at + part.len()..]);
+            found.is_some()
+        })
     };
     pattern.is_empty() || pattern == "." || pattern.split('|').any(one)
 }
 
 /// What is wrong with an outcome, if anything.
-fn judge(
-    row: &Expected<'_>,
-    world: &mut World,
-    result: &Result<LoadReport, LoadError>,
-) -> Option<String> {
+fn judge(row: &Expected<'_>, world: &mut World, result: &Result<LoadReport, LoadError>) -> Option<String> {
     let report = match result {
         Err(error) => {
             let message = error.to_string();
@@ -187,9 +148,7 @@ fn judge(
             return match row.outcome {
                 "load" | "warn" => Some(format!("refused: {message}")),
                 _ if message.contains('\n') => Some(format!("message of several lines: {message}")),
-                _ if !message.contains(name) => {
-                    Some(format!("message does not name the file: {message}"))
-                }
+                _ if !message.contains(name) => Some(format!("message does not name the file: {message}")),
                 _ if !says(&message, row.words) => {
                     Some(format!("message does not say {}: {message}", row.words))
                 }
@@ -205,15 +164,14 @@ fn judge(
     let area = area(world);
     match row.outcome {
         "refuse" => Some("accepted".to_owned()),
-        "warn" if !says(&said, row.words) => {
-            Some(format!("no warning that says {}: {said}", row.words))
+        "warn" if !says(&said, row.words) => Some(format!("no warning that says {}: {said}", row.words)),
+        _ if row.triangles != "-" && row.triangles != report.triangles.to_string() => {
+            Some(format!("{} triangles, expected {}", report.triangles, row.triangles))
         }
-        _ if row.triangles != "-" && row.triangles != report.triangles.to_string() => Some(
-            format!("{} triangles, expected {}", report.triangles, row.triangles),
-        ),
-        _ if row.area.parse::<f64>().is_ok_and(|expected| {
-            !area.is_finite() || (area - expected).abs() > 1e-4 * expected
-        }) =>
+        _ if row
+            .area
+            .parse::<f64>()
+            .is_ok_and(|expected| !area.is_finite() || (area - expected).abs() > 1e-4 * expected) =>
         {
             Some(format!("area {area}, expected {}", row.area))
         }
@@ -242,28 +200,15 @@ fn every_broken_file_has_an_allowed_outcome() {
             rows += 1;
             let start = std::time::Instant::now();
             let (mut world, result) = load_file(&path);
-            let row = Expected {
-                file,
-                outcome,
-                triangles,
-                area,
-                words,
-            };
-            failures.extend(
-                judge(&row, &mut world, &result).map(|why| format!("{file} [{outcome}]: {why}")),
-            );
+            let row = Expected { file, outcome, triangles, area, words };
+            failures.extend(judge(&row, &mut world, &result).map(|why| format!("{file} [{outcome}]: {why}")));
             if start.elapsed().as_secs() >= 10 {
                 failures.push(format!("{file}: took {:?}", start.elapsed()));
             }
         }
     }
     assert!(rows >= 400, "only {rows} rows in the tables");
-    assert!(
-        failures.is_empty(),
-        "{} of {rows} failed:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
+    assert!(failures.is_empty(), "{} of {rows} failed:\n{}", failures.len(), failures.join("\n"));
 }
 
 #[test]

@@ -15,9 +15,7 @@ use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::light::FlatLight;
 use penumbra::trace::scene::InstanceData;
 use penumbra::trace::surface::Interaction;
-use penumbra::trace::{
-    Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint,
-};
+use penumbra::trace::{Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
 use stage::{Estimate, Rng, Stage, ball, cube, quad, reds, settings};
 use std::sync::Arc;
 
@@ -26,32 +24,19 @@ const HERE: DAffine3 = DAffine3::IDENTITY;
 /// The box from −1 to 1 seen from inside.
 fn room(material: Material, max_depth: u32, size: u32) -> Stage {
     let mut stage = Stage::new(settings(size, size, Integrator::Path, max_depth));
-    stage.add_mesh(
-        cube(),
-        Material {
-            double_sided: true,
-            ..material
-        },
-        HERE,
-    );
+    stage.add_mesh(cube(), Material { double_sided: true, ..material }, HERE);
     stage.look_wide(DVec3::new(0.2, 0.3, -0.4), DVec3::new(0.9, -0.5, 0.6));
     stage
 }
 
 #[test]
 fn mirror_in_mirror_stops_exactly_at_the_last_bounce() {
-    let mirror = || Material {
-        emission: Vec3::ONE,
-        ..Material::perfect_mirror(Vec3::splat(0.9))
-    };
+    let mirror = || Material { emission: Vec3::ONE, ..Material::perfect_mirror(Vec3::splat(0.9)) };
     for k in [0, 1, 4] {
         let mut stage = room(mirror(), k, 16);
         let exact = (1.0 - 0.9f64.powi(k as i32 + 1)) / 0.1;
         for radiance in reds(stage.trace(4)) {
-            assert!(
-                (radiance - exact).abs() < 1e-6,
-                "{k} bounces: {radiance}, not {exact}"
-            );
+            assert!((radiance - exact).abs() < 1e-6, "{k} bounces: {radiance}, not {exact}");
         }
     }
     // From the fifth bounce on paths end by chance.
@@ -62,28 +47,16 @@ fn mirror_in_mirror_stops_exactly_at_the_last_bounce() {
 #[test]
 fn a_closed_glowing_room_has_its_geometric_series() {
     for (albedo, exact, samples) in [(0.5, 2.0, 256), (0.8, 5.0, 512)] {
-        let walls = Material {
-            emission: Vec3::ONE,
-            ..Material::lambert(Vec3::splat(albedo))
-        };
+        let walls = Material { emission: Vec3::ONE, ..Material::lambert(Vec3::splat(albedo)) };
         let mut stage = room(walls, 1000, 32);
-        Estimate::of(&reds(stage.trace(samples))).assert_is(
-            &format!("albedo {albedo}"),
-            exact,
-            3e-3,
-        );
+        Estimate::of(&reds(stage.trace(samples))).assert_is(&format!("albedo {albedo}"), exact, 3e-3);
     }
 }
 
 /// A white environment, a ball in it, and a picture that shows all of the ball and some environment.
 fn furnace(material: Material, max_depth: u32, samples: u32) -> Vec<f64> {
     let mut stage = Stage::new(settings(32, 32, Integrator::Path, max_depth));
-    stage.add(
-        Light::Environment {
-            radiance: Vec3::ONE,
-        },
-        HERE,
-    );
+    stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
     stage.add_mesh(ball(16), material, HERE);
     stage.look(DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO, DVec3::Y, 2.2);
     reds(stage.trace(samples))
@@ -91,55 +64,25 @@ fn furnace(material: Material, max_depth: u32, samples: u32) -> Vec<f64> {
 
 #[test]
 fn a_white_furnace_loses_nothing() {
-    for (i, radiance) in furnace(Material::lambert(Vec3::ONE), 8, 64)
-        .into_iter()
-        .enumerate()
-    {
-        assert!(
-            (radiance - 1.0).abs() < 1e-5,
-            "diffuse, pixel {i}: {radiance}"
-        );
+    for (i, radiance) in furnace(Material::lambert(Vec3::ONE), 8, 64).into_iter().enumerate() {
+        assert!((radiance - 1.0).abs() < 1e-5, "diffuse, pixel {i}: {radiance}");
     }
-    let clear = Glass {
-        ior: 1.5,
-        tint: Vec3::ONE,
-    };
-    let glass = Material {
-        glass: Some(clear),
-        ..Material::lambert(Vec3::ZERO)
-    };
+    let clear = Glass { ior: 1.5, tint: Vec3::ONE };
+    let glass = Material { glass: Some(clear), ..Material::lambert(Vec3::ZERO) };
     let pixels = furnace(glass, 1000, 64);
     for (i, radiance) in pixels.iter().enumerate() {
-        assert!(
-            (radiance - 1.0).abs() < 1e-5,
-            "glass, pixel {i}: {radiance}"
-        );
+        assert!((radiance - 1.0).abs() < 1e-5, "glass, pixel {i}: {radiance}");
     }
-    for (i, radiance) in furnace(Material::perfect_mirror(Vec3::ONE), 8, 16)
-        .into_iter()
-        .enumerate()
-    {
-        assert!(
-            (radiance - 1.0).abs() < 1e-5,
-            "mirror, pixel {i}: {radiance}"
-        );
+    for (i, radiance) in furnace(Material::perfect_mirror(Vec3::ONE), 8, 16).into_iter().enumerate() {
+        assert!((radiance - 1.0).abs() < 1e-5, "mirror, pixel {i}: {radiance}");
     }
 }
 
 /// What a plane sends back toward `angle` from its normal when the whole sky has radiance 1.
 fn plane_under_a_white_sky(material: Material, angle: f64, samples: u32) -> Estimate {
     let mut stage = Stage::new(settings(16, 16, Integrator::Path, 1));
-    stage.add(
-        Light::Environment {
-            radiance: Vec3::ONE,
-        },
-        HERE,
-    );
-    stage.add_mesh(
-        quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0),
-        material,
-        HERE,
-    );
+    stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
+    stage.add_mesh(quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0), material, HERE);
     let toward = DVec3::new(angle.sin(), 0.0, angle.cos());
     stage.look(toward * 0.5, DVec3::ZERO, DVec3::Y, 1e-5);
     Estimate::of(&reds(stage.trace(samples)))
@@ -153,41 +96,19 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
     let black = Material::lambert(Vec3::ZERO);
     let mut cases = Vec::new();
     for roughness in [0.0, 0.05, 0.1, 0.3, 0.5, 0.7, 1.0] {
-        let glossy = Glossy::Ggx {
-            metallic: 1.0,
-            roughness,
-            texture: None,
-        };
-        cases.push((
-            format!("metal of roughness {roughness}"),
-            Material {
-                glossy,
-                ..white.clone()
-            },
-        ));
+        let glossy = Glossy::Ggx { metallic: 1.0, roughness, texture: None };
+        cases.push((format!("metal of roughness {roughness}"), Material { glossy, ..white.clone() }));
     }
     for exponent in [0.0, 1.0, 10.0, 50.0, 1000.0] {
-        let glossy = Glossy::BlinnPhong {
-            specular: Vec3::ONE,
-            exponent,
-        };
-        cases.push((
-            format!("Blinn-Phong of exponent {exponent}"),
-            Material {
-                glossy,
-                ..black.clone()
-            },
-        ));
+        let glossy = Glossy::BlinnPhong { specular: Vec3::ONE, exponent };
+        cases.push((format!("Blinn-Phong of exponent {exponent}"), Material { glossy, ..black.clone() }));
     }
     for (name, material) in cases {
         let mut line = String::new();
         for angle in ANGLES {
             let e = plane_under_a_white_sky(material.clone(), angle, 256);
             assert!(e.sigma < 5e-3, "{name}: {e:?}");
-            assert!(
-                e.mean <= 1.0 + 4.5 * e.sigma + 1e-5,
-                "{name} at {angle}: {e:?}"
-            );
+            assert!(e.mean <= 1.0 + 4.5 * e.sigma + 1e-5, "{name} at {angle}: {e:?}");
             assert!(e.mean > 0.0);
             line += &format!(" {:.4}", 1.0 - e.mean);
         }
@@ -195,44 +116,15 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
     }
     // At roughness 1 the loss has a closed form: c ln((1 + c) / c) at cosine c.
     for angle in ANGLES {
-        let glossy = Glossy::Ggx {
-            metallic: 1.0,
-            roughness: 1.0,
-            texture: None,
-        };
-        let e = plane_under_a_white_sky(
-            Material {
-                glossy,
-                ..white.clone()
-            },
-            angle,
-            1024,
-        );
+        let glossy = Glossy::Ggx { metallic: 1.0, roughness: 1.0, texture: None };
+        let e = plane_under_a_white_sky(Material { glossy, ..white.clone() }, angle, 1024);
         let c = angle.cos();
-        e.assert_is(
-            &format!("metal of roughness 1 at {angle}"),
-            1.0 - c * ((1.0 + c) / c).ln(),
-            2e-3,
-        );
+        e.assert_is(&format!("metal of roughness 1 at {angle}"), 1.0 - c * ((1.0 + c) / c).ln(), 2e-3);
     }
     for roughness in [0.1, 0.5, 1.0] {
-        let glossy = Glossy::Ggx {
-            metallic: 1.0,
-            roughness,
-            texture: None,
-        };
-        let e = Estimate::of(&furnace(
-            Material {
-                glossy,
-                ..white.clone()
-            },
-            8,
-            64,
-        ));
-        assert!(
-            e.mean <= 1.0 + 4.5 * e.sigma,
-            "a ball of roughness {roughness}: {e:?}"
-        );
+        let glossy = Glossy::Ggx { metallic: 1.0, roughness, texture: None };
+        let e = Estimate::of(&furnace(Material { glossy, ..white.clone() }, 8, 64));
+        assert!(e.mean <= 1.0 + 4.5 * e.sigma, "a ball of roughness {roughness}: {e:?}");
     }
 }
 
@@ -241,51 +133,23 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
 #[test]
 fn the_gltf_dielectric_gains_what_its_specification_says() {
     for roughness in [0.1, 0.5, 1.0] {
-        let glossy = Glossy::Ggx {
-            metallic: 0.0,
-            roughness,
-            texture: None,
-        };
-        let material = Material {
-            glossy,
-            ..Material::lambert(Vec3::ONE)
-        };
+        let glossy = Glossy::Ggx { metallic: 0.0, roughness, texture: None };
+        let material = Material { glossy, ..Material::lambert(Vec3::ONE) };
         let sums = ANGLES.map(|angle| plane_under_a_white_sky(material.clone(), angle, 256).mean);
         println!("white dielectric of roughness {roughness}: {sums:.3?}");
-        assert!(
-            sums[..3].iter().all(|s| (0.95..1.06).contains(s)),
-            "{sums:?}"
-        );
+        assert!(sums[..3].iter().all(|s| (0.95..1.06).contains(s)), "{sums:?}");
         assert!(sums.iter().all(|s| *s < 2.0), "{sums:?}");
     }
 }
 
 fn glossy_scene(integrator: Integrator) -> Stage {
     let mut stage = Stage::new(settings(16, 16, integrator, 1));
-    let glossy = Glossy::Ggx {
-        metallic: 0.5,
-        roughness: 0.4,
-        texture: None,
-    };
-    let floor = Material {
-        glossy,
-        ..Material::lambert(Vec3::splat(0.6))
-    };
-    stage.add_mesh(
-        quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0),
-        floor,
-        HERE,
-    );
-    let light = Light::Parallelogram {
-        edge_u: Vec3::X,
-        edge_v: Vec3::Y,
-        radiance: [Vec3::ONE; 4],
-        two_sided: true,
-    };
-    stage.add(
-        light,
-        DAffine3::from_translation(DVec3::new(-1.0, 0.0, 1.2)),
-    );
+    let glossy = Glossy::Ggx { metallic: 0.5, roughness: 0.4, texture: None };
+    let floor = Material { glossy, ..Material::lambert(Vec3::splat(0.6)) };
+    stage.add_mesh(quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0), floor, HERE);
+    let light =
+        Light::Parallelogram { edge_u: Vec3::X, edge_v: Vec3::Y, radiance: [Vec3::ONE; 4], two_sided: true };
+    stage.add(light, DAffine3::from_translation(DVec3::new(-1.0, 0.0, 1.2)));
     stage.look(DVec3::new(0.3, 0.0, 0.4), DVec3::ZERO, DVec3::Y, 1e-5);
     stage
 }
@@ -309,20 +173,14 @@ fn every_way_of_sampling_finds_the_same_light() {
     for _ in 0..256 {
         let (mut light_sum, mut bounce_sum) = (0.0, 0.0);
         for _ in 0..8192 {
-            if let Some(sample) = scene
-                .lights
-                .get(0)
-                .sample(at.position, bsdf.normal(), rng.pair())
-            {
+            if let Some(sample) = scene.lights.get(0).sample(at.position, bsdf.normal(), rng.pair()) {
                 let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
-                light_sum +=
-                    f64::from(((diffuse + glossy) * sample.radiance).x / sample.pdf.unwrap());
+                light_sum += f64::from(((diffuse + glossy) * sample.radiance).x / sample.pdf.unwrap());
             }
             if let Some(sample) = bsdf.sample(wo, rng.unit(), rng.pair(), Lobes::ALL) {
                 let ray = Ray::new(at.origin_toward(sample.wi), sample.wi);
                 if let Some(found) = scene.lights.closest(&ray) {
-                    bounce_sum +=
-                        f64::from((sample.weight * found.shape.emitted(&ray, &found.hit).0).x);
+                    bounce_sum += f64::from((sample.weight * found.shape.emitted(&ray, &found.hit).0).x);
                 }
             }
         }
@@ -330,12 +188,8 @@ fn every_way_of_sampling_finds_the_same_light() {
         by_bounce.push(bounce_sum / 8192.0);
     }
     let (by_light, by_bounce) = (Estimate::of(&by_light), Estimate::of(&by_bounce));
-    for (name, e) in [
-        ("direct", direct),
-        ("path", path),
-        ("light samples", by_light),
-        ("bounces", by_bounce),
-    ] {
+    for (name, e) in [("direct", direct), ("path", path), ("light samples", by_light), ("bounces", by_bounce)]
+    {
         println!("{name}: {:.6} ± {:.1e}", e.mean, e.sigma);
         for (other_name, other) in [("direct", direct), ("light samples", by_light)] {
             let sigma = e.sigma.hypot(other.sigma);
@@ -352,24 +206,10 @@ fn every_way_of_sampling_finds_the_same_light() {
 fn direct_light_is_the_path_tracers_first_bounce_with_every_kind_of_light() {
     let picture = |integrator| {
         let mut stage = Stage::new(settings(64, 64, integrator, 1));
-        let floor = |glossy, albedo: f32| Material {
-            glossy,
-            ..Material::lambert(Vec3::splat(albedo))
-        };
-        let ggx = Glossy::Ggx {
-            metallic: 0.2,
-            roughness: 0.3,
-            texture: None,
-        };
-        let phong = Glossy::BlinnPhong {
-            specular: Vec3::splat(0.4),
-            exponent: 20.0,
-        };
-        stage.add_mesh(
-            quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0),
-            floor(ggx, 0.7),
-            HERE,
-        );
+        let floor = |glossy, albedo: f32| Material { glossy, ..Material::lambert(Vec3::splat(albedo)) };
+        let ggx = Glossy::Ggx { metallic: 0.2, roughness: 0.3, texture: None };
+        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.4), exponent: 20.0 };
+        stage.add_mesh(quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0), floor(ggx, 0.7), HERE);
         let place = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
         stage.add_mesh(ball(12), floor(phong, 0.4), place(0.0, 1.0, 0.0));
         stage.add_mesh(
@@ -377,43 +217,18 @@ fn direct_light_is_the_path_tracers_first_bounce_with_every_kind_of_light() {
             Material::emissive(Vec3::splat(4.0)),
             place(2.0, 2.5, 1.0) * DAffine3::from_scale(DVec3::splat(0.4)),
         );
-        stage.add(
-            Light::Environment {
-                radiance: Vec3::splat(0.1),
-            },
-            HERE,
-        );
+        stage.add(Light::Environment { radiance: Vec3::splat(0.1) }, HERE);
         let sun = DAffine3::from_axis_angle(DVec3::X, -0.9);
-        stage.add(
-            Light::Directional {
-                irradiance: Vec3::splat(1.0),
-                angle: 0.1,
-            },
-            sun,
-        );
-        stage.add(
-            Light::Sphere {
-                radius: 0.3,
-                radiance: Vec3::splat(6.0),
-            },
-            place(-1.5, 2.0, 0.8),
-        );
-        stage.add(
-            Light::Point {
-                intensity: Vec3::ONE,
-            },
-            place(0.0, 3.0, -2.0),
-        );
+        stage.add(Light::Directional { irradiance: Vec3::splat(1.0), angle: 0.1 }, sun);
+        stage.add(Light::Sphere { radius: 0.3, radiance: Vec3::splat(6.0) }, place(-1.5, 2.0, 0.8));
+        stage.add(Light::Point { intensity: Vec3::ONE }, place(0.0, 3.0, -2.0));
         stage.look_wide(DVec3::new(2.0, 2.5, 4.0), DVec3::new(0.0, 0.8, 0.0));
         stage.trace(256).clone()
     };
     let (direct, path) = (picture(Integrator::Direct), picture(Integrator::Path));
     // 8×8 pixels together; the halves of both films tell the noise of their difference.
     let mut tiles = Vec::new();
-    for (x, y) in (0..64)
-        .step_by(8)
-        .flat_map(|x| (0..64).step_by(8).map(move |y| (x, y)))
-    {
+    for (x, y) in (0..64).step_by(8).flat_map(|x| (0..64).step_by(8).map(move |y| (x, y))) {
         let (mut off, mut noise) = (0.0, 0.0);
         for (i, j) in (0..8).flat_map(|i| (0..8).map(move |j| (i, j))) {
             let (a, b) = (direct.pixel(x + i, y + j), path.pixel(x + i, y + j));
@@ -431,58 +246,27 @@ fn direct_light_is_the_path_tracers_first_bounce_with_every_kind_of_light() {
 
 #[test]
 fn a_closed_room_is_exactly_dark_whatever_shines_outside() {
-    for (scale, shift) in [
-        (1.0, DVec3::ZERO),
-        (1e-3, DVec3::ZERO),
-        (1e3, DVec3::ZERO),
-        (1.0, DVec3::splat(1e5)),
-    ] {
+    for (scale, shift) in
+        [(1.0, DVec3::ZERO), (1e-3, DVec3::ZERO), (1e3, DVec3::ZERO), (1.0, DVec3::splat(1e5))]
+    {
         for integrator in [Integrator::Direct, Integrator::Path] {
             let mut stage = Stage::placed(settings(48, 48, integrator, 6), scale, shift);
             let turn = DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
             stage.add_mesh(cube(), Material::lambert(Vec3::splat(0.9)), turn);
+            stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
+            stage.add(Light::Directional { irradiance: Vec3::ONE, angle: 0.0 }, HERE);
             stage.add(
-                Light::Environment {
-                    radiance: Vec3::ONE,
-                },
-                HERE,
-            );
-            stage.add(
-                Light::Directional {
-                    irradiance: Vec3::ONE,
-                    angle: 0.0,
-                },
-                HERE,
-            );
-            stage.add(
-                Light::Directional {
-                    irradiance: Vec3::ONE,
-                    angle: 0.1,
-                },
+                Light::Directional { irradiance: Vec3::ONE, angle: 0.1 },
                 DAffine3::from_rotation_x(1.0),
             );
             stage.add(
-                Light::Sphere {
-                    radius: 1.0,
-                    radiance: Vec3::ONE,
-                },
+                Light::Sphere { radius: 1.0, radiance: Vec3::ONE },
                 DAffine3::from_translation(DVec3::X * 3.5),
             );
-            stage.add(
-                Light::Point {
-                    intensity: Vec3::ONE,
-                },
-                DAffine3::from_translation(DVec3::Y * 2.5),
-            );
-            stage.look_wide(
-                turn.transform_point3(DVec3::new(0.9, 0.8, 0.7)),
-                DVec3::new(-0.5, -0.6, -0.4),
-            );
+            stage.add(Light::Point { intensity: Vec3::ONE }, DAffine3::from_translation(DVec3::Y * 2.5));
+            stage.look_wide(turn.transform_point3(DVec3::new(0.9, 0.8, 0.7)), DVec3::new(-0.5, -0.6, -0.4));
             let film = stage.trace(32);
-            assert!(
-                reds(film).iter().all(|&r| r == 0.0),
-                "scale {scale}, shift {shift}, {integrator:?}"
-            );
+            assert!(reds(film).iter().all(|&r| r == 0.0), "scale {scale}, shift {shift}, {integrator:?}");
         }
     }
 }
@@ -501,16 +285,9 @@ impl Alone {
         let triangles: Vec<_> = (0..mesh.triangles.len()).map(|i| mesh.corners(i)).collect();
         let placement = Placement::new(Arc::new(Blas::build(&triangles)), place)?;
         let normal_matrix = place.matrix3.inverse().transpose();
-        let data = InstanceData {
-            mesh: Arc::new(mesh),
-            materials: Vec::new(),
-            normal_matrix,
-        };
+        let data = InstanceData { mesh: Arc::new(mesh), materials: Vec::new(), normal_matrix };
         Some(Self {
-            geometry: Geometry {
-                tlas: Tlas::build(vec![placement]),
-                instances: vec![data],
-            },
+            geometry: Geometry { tlas: Tlas::build(vec![placement]), instances: vec![data] },
             surfaces: Surfaces::default(),
             lights: Lights::default(),
             viewpoint: Viewpoint::default(),
@@ -519,20 +296,8 @@ impl Alone {
     }
 
     fn scene(&self) -> TraceScene<'_> {
-        let Self {
-            geometry,
-            surfaces,
-            lights,
-            viewpoint,
-            settings,
-        } = self;
-        TraceScene {
-            geometry,
-            surfaces,
-            lights,
-            viewpoint,
-            settings,
-        }
+        let Self { geometry, surfaces, lights, viewpoint, settings } = self;
+        TraceScene { geometry, surfaces, lights, viewpoint, settings }
     }
 
     fn at(&self, hit: &Hit, ray: &Ray) -> Interaction {
@@ -547,13 +312,7 @@ fn returns(alone: &Alone, rng: &mut Rng, points: u32, rays: u32) -> (u32, u32) {
     for _ in 0..points {
         let s = rng.unit().sqrt();
         let v = s * rng.unit();
-        let hit = Hit {
-            t: 1.0,
-            u: (1.0 - s).max(0.0),
-            v,
-            triangle: 0,
-            instance: 0,
-        };
+        let hit = Hit { t: 1.0, u: (1.0 - s).max(0.0), v, triangle: 0, instance: 0 };
         // The side does not depend on where the ray began.
         let at = alone.at(&hit, &Ray::new(Vec3::ZERO, rng.direction()));
         for _ in 0..rays {
@@ -569,11 +328,7 @@ fn returns(alone: &Alone, rng: &mut Rng, points: u32, rays: u32) -> (u32, u32) {
             let target = at.position + direction * size;
             let toward = target - origin;
             if toward.is_finite() && at.geometric_normal.dot(toward) > 0.0 {
-                back += u32::from(tlas.any_hit(&Ray {
-                    origin,
-                    direction: toward,
-                    t_max: 1.0,
-                }));
+                back += u32::from(tlas.any_hit(&Ray { origin, direction: toward, t_max: 1.0 }));
                 tried += 1;
             }
         }
@@ -584,10 +339,7 @@ fn returns(alone: &Alone, rng: &mut Rng, points: u32, rays: u32) -> (u32, u32) {
 /// Height over longest side, twice: 1 and more for a good triangle, next to 0 for a needle.
 fn roundness([a, b, c]: [Vec3; 3]) -> f64 {
     let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-    let longest = (b - a)
-        .length_squared()
-        .max((c - b).length_squared())
-        .max((a - c).length_squared());
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
     2.0 * (b - a).cross(c - a).length() / longest
 }
 
@@ -604,11 +356,8 @@ fn no_ray_comes_back_to_the_triangle_it_leaves() {
             let (size, center) = (rng.decades(-8.0, 8.0), rng.vec());
             [0; 3].map(|_| (center + rng.vec()) * size)
         };
-        let mesh = TriangleMesh {
-            positions: corners.to_vec(),
-            triangles: vec![[0, 1, 2]],
-            ..Default::default()
-        };
+        let mesh =
+            TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
         let Some(alone) = Alone::new(mesh, HERE) else {
             continue;
         };
@@ -617,10 +366,7 @@ fn no_ray_comes_back_to_the_triangle_it_leaves() {
         tried[needle] += t;
         back[needle] += b;
     }
-    println!(
-        "{} of {} came back; of needles {} of {}",
-        back[0], tried[0], back[1], tried[1]
-    );
+    println!("{} of {} came back; of needles {} of {}", back[0], tried[0], back[1], tried[1]);
     assert!(tried[0] > 1_000_000 && tried[1] > 100_000);
     assert_eq!(back[0], 0);
     // A needle 10⁴ times as long as wide, seen almost end-on, is thinner than a unit in the last place of
@@ -634,11 +380,8 @@ fn no_ray_comes_back_to_the_placed_triangle_it_leaves() {
     let (mut tried, mut back) = (0, 0);
     for _ in 0..1000 {
         let corners = [0; 3].map(|_| rng.vec());
-        let mesh = TriangleMesh {
-            positions: corners.to_vec(),
-            triangles: vec![[0, 1, 2]],
-            ..Default::default()
-        };
+        let mesh =
+            TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
         let scale = DVec3::new(0.0, 0.0, 0.0).map(|_| f64::from(rng.decades(-4.0, 4.0)));
         let at = DVec3::ZERO.map(|_| f64::from(rng.decades(-4.0, 4.0)));
         let place = DAffine3::from_scale_rotation_translation(scale, rng.rotation(), at);
@@ -656,23 +399,14 @@ fn no_ray_comes_back_to_the_placed_triangle_it_leaves() {
 fn a_ray_does_not_leap_over_a_narrow_gap() {
     // Two unit squares, the upper one `gap` above; shadow rays from the lower one go up through it.
     let smallest = 2f32.powi(-14);
-    for (shift, smallest) in [
-        (0.0, smallest),
-        (1.0, smallest),
-        (1e3, 64.0 * 6.1e-5),
-        (1e5, 64.0 * 7.8e-3),
-    ] {
+    for (shift, smallest) in [(0.0, smallest), (1.0, smallest), (1e3, 64.0 * 6.1e-5), (1e5, 64.0 * 7.8e-3)] {
         let mut rng = Rng(9);
         let mut works = f32::INFINITY;
         for power in 1..30 {
             let gap = 2f32.powi(-power);
             let at = Vec3::splat(shift);
             let mut mesh = quad(at, Vec3::X, Vec3::Y);
-            let upper = quad(
-                at + Vec3::new(-1.0, -1.0, gap),
-                Vec3::X * 3.0,
-                Vec3::Y * 3.0,
-            );
+            let upper = quad(at + Vec3::new(-1.0, -1.0, gap), Vec3::X * 3.0, Vec3::Y * 3.0);
             if upper.positions[0].z == at.z {
                 break;
             }
@@ -681,19 +415,10 @@ fn a_ray_does_not_leap_over_a_narrow_gap() {
             let alone = Alone::new(mesh, HERE).unwrap();
             let blocked = (0..2000).all(|_| {
                 let (u, v) = (rng.unit() * 0.8 + 0.1, rng.unit() * 0.1);
-                let hit = Hit {
-                    t: 1.0,
-                    u,
-                    v: v.min(1.0 - u),
-                    triangle: 0,
-                    instance: 0,
-                };
+                let hit = Hit { t: 1.0, u, v: v.min(1.0 - u), triangle: 0, instance: 0 };
                 let from = alone.at(&hit, &Ray::new(Vec3::ZERO, -Vec3::Z));
                 let toward = Vec3::new(rng.unit() - 0.5, rng.unit() - 0.5, 1.0) * 1e-2 + Vec3::Z;
-                alone
-                    .geometry
-                    .tlas
-                    .any_hit(&Ray::new(from.origin_toward(toward), toward))
+                alone.geometry.tlas.any_hit(&Ray::new(from.origin_toward(toward), toward))
             });
             if !blocked {
                 break;
@@ -712,55 +437,28 @@ fn a_light_of_no_use_is_no_harm() {
     assert_eq!(stage.trace(3).pixel(0, 0).mean(), DVec3::ZERO);
     let mut stage = Stage::new(settings(1, 1, Integrator::Path, 4));
     stage.add_mesh(TriangleMesh::default(), Material::emissive(Vec3::ONE), HERE);
-    stage.add_mesh(
-        quad(-Vec3::ONE, Vec3::X, Vec3::Y),
-        Material::default(),
-        HERE,
-    );
+    stage.add_mesh(quad(-Vec3::ONE, Vec3::X, Vec3::Y), Material::default(), HERE);
     let nowhere = DAffine3::from_translation(DVec3::splat(f64::NAN));
     for light in [
-        Light::Point {
-            intensity: Vec3::ONE,
-        },
-        Light::Sphere {
-            radius: 1.0,
-            radiance: Vec3::ONE,
-        },
-        Light::Segment {
-            half_length: 1.0,
-            strength: [Vec3::ONE; 2],
-            emission: Default::default(),
-        },
-        Light::Disk {
-            radius: 1.0,
-            radiance: Vec3::ONE,
-            two_sided: true,
-        },
+        Light::Point { intensity: Vec3::ONE },
+        Light::Sphere { radius: 1.0, radiance: Vec3::ONE },
+        Light::Segment { half_length: 1.0, strength: [Vec3::ONE; 2], emission: Default::default() },
+        Light::Disk { radius: 1.0, radiance: Vec3::ONE, two_sided: true },
     ] {
         stage.add(light.clone(), nowhere);
         stage.add(light, DAffine3::from_scale(DVec3::splat(f64::INFINITY)));
     }
     assert_eq!(stage.trace(3).pixel(0, 0).mean(), DVec3::ZERO);
-    assert!(
-        stage.scene().lights.is_empty(),
-        "{:?}",
-        stage.scene().lights
-    );
+    assert!(stage.scene().lights.is_empty(), "{:?}", stage.scene().lights);
 }
 
 #[test]
 fn lights_beyond_all_measure_are_still_chosen() {
-    let lamp = |i: f32| FlatLight::Point {
-        position: Vec3::ZERO,
-        intensity: Vec3::splat(i),
-    };
+    let lamp = |i: f32| FlatLight::Point { position: Vec3::ZERO, intensity: Vec3::splat(i) };
     let lights = Lights::new(vec![lamp(3e38), lamp(3e38), lamp(1.0)], Vec::new(), 1.0);
     let chances: Vec<f32> = (0..3).map(|i| lights.chance(1, i)).collect();
     assert!(chances.iter().all(|&c| c > 0.0), "{chances:?}");
-    assert!(
-        (chances.iter().sum::<f32>() - 1.0).abs() < 1e-6,
-        "{chances:?}"
-    );
+    assert!((chances.iter().sum::<f32>() - 1.0).abs() < 1e-6, "{chances:?}");
 }
 
 #[test]
@@ -773,9 +471,7 @@ fn an_empty_mesh_does_not_spoil_the_origin() {
         }
         stage.add_mesh(ball(8), Material::default(), place);
         stage.add(
-            Light::Point {
-                intensity: Vec3::ONE,
-            },
+            Light::Point { intensity: Vec3::ONE },
             place * DAffine3::from_translation(DVec3::splat(2.0)),
         );
         let p = |x, y, z| place.transform_point3(DVec3::new(x, y, z));
@@ -784,9 +480,6 @@ fn an_empty_mesh_does_not_spoil_the_origin() {
     };
     let here = picture(HERE, false);
     assert!(here == picture(HERE, true));
-    assert!(
-        here == picture(far, false),
-        "1e7 is a multiple of the ball's size: equal bit for bit"
-    );
+    assert!(here == picture(far, false), "1e7 is a multiple of the ball's size: equal bit for bit");
     assert!(here == picture(far, true), "with an empty mesh beside it");
 }

@@ -40,20 +40,14 @@ fn has_tool(name: &str) -> bool {
 
 /// A desktop for `test`; `None`, and a line that says so, if the tools are missing and may be.
 fn desktop(test: &str) -> Option<Desktop> {
-    let missing: Vec<&str> = ["Xvfb", "xdotool", "import"]
-        .into_iter()
-        .filter(|tool| !has_tool(tool))
-        .collect();
+    let missing: Vec<&str> =
+        ["Xvfb", "xdotool", "import"].into_iter().filter(|tool| !has_tool(tool)).collect();
     if missing.is_empty() {
         return Some(Desktop::open(test));
     }
     let required = std::env::var_os("CI").is_some()
         || std::env::var_os("PENUMBRA_WINDOW_TESTS").is_some_and(|v| v == "required");
-    assert!(
-        !required,
-        "{test}: {} must be installed",
-        missing.join(", ")
-    );
+    assert!(!required, "{test}: {} must be installed", missing.join(", "));
     println!("SKIPPED {test}: not installed: {}", missing.join(", "));
     None
 }
@@ -76,37 +70,20 @@ fn pause(milliseconds: u64) {
 impl Desktop {
     fn open(test: &str) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        let directory =
-            std::env::temp_dir().join(format!("penumbra-{test}-{}", std::process::id()));
+        let directory = std::env::temp_dir().join(format!("penumbra-{test}-{}", std::process::id()));
         std::fs::create_dir_all(&directory).unwrap();
         // The server chooses a free display itself and says which.
         let mut server = Command::new("Xvfb")
-            .args([
-                "-displayfd",
-                "1",
-                "-screen",
-                "0",
-                "1280x800x24",
-                "-nolisten",
-                "tcp",
-            ])
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
         let mut number = String::new();
-        BufReader::new(server.stdout.take().unwrap())
-            .read_line(&mut number)
-            .unwrap();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
         let display = format!(":{}", number.trim());
-        let mut desktop = Self {
-            server,
-            manager: None,
-            display,
-            directory,
-            _turn: turn,
-        };
+        let mut desktop = Self { server, manager: None, display, directory, _turn: turn };
         if has_tool("openbox") && has_tool("wmctrl") {
             // A window that is mapped before the manager is ready stays hidden.
             let ready = desktop.directory.join("ready");
@@ -153,15 +130,9 @@ impl Desktop {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        let mut program = Program {
-            child,
-            window: String::new(),
-        };
+        let mut program = Program { child, window: String::new() };
         program.window = wait_for("the window", || {
-            assert!(
-                program.child.try_wait().unwrap().is_none(),
-                "the program ended at once"
-            );
+            assert!(program.child.try_wait().unwrap().is_none(), "the program ended at once");
             let found = self.xdotool(["search", "--onlyvisible", "--class", "^penumbra$"]);
             found.lines().next().map(str::to_owned)
         });
@@ -170,15 +141,9 @@ impl Desktop {
     }
 
     fn focus(&self, program: &Program) {
-        let verb = if self.manager.is_some() {
-            "windowactivate"
-        } else {
-            "windowfocus"
-        };
+        let verb = if self.manager.is_some() { "windowactivate" } else { "windowfocus" };
         self.xdotool([verb, &program.window]);
-        wait_for("the focus", || {
-            (self.xdotool(["getwindowfocus"]) == program.window).then_some(())
-        });
+        wait_for("the focus", || (self.xdotool(["getwindowfocus"]) == program.window).then_some(()));
     }
 
     fn title(&self, program: &Program) -> String {
@@ -188,10 +153,7 @@ impl Desktop {
     /// Waits until all samples are there.
     fn wait_until_done(&self, program: &mut Program) {
         wait_for("the sample target", || {
-            assert!(
-                program.child.try_wait().unwrap().is_none(),
-                "the program ended"
-            );
+            assert!(program.child.try_wait().unwrap().is_none(), "the program ended");
             self.title(program).ends_with("- done").then_some(())
         });
         // The last picture is on its way.
@@ -205,11 +167,7 @@ impl Desktop {
             .args(["-window", &program.window, "-depth", "8", "png:-"])
             .output()
             .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         image::load_from_memory(&output.stdout).unwrap().to_rgb8()
     }
 
@@ -217,9 +175,7 @@ impl Desktop {
         let geometry = self.xdotool(["getwindowgeometry", "--shell", &program.window]);
         let value = |name: &str| {
             let line = geometry.lines().find_map(|line| line.strip_prefix(name));
-            line.unwrap_or_else(|| panic!("no {name} in {geometry}"))
-                .parse()
-                .unwrap()
+            line.unwrap_or_else(|| panic!("no {name} in {geometry}")).parse().unwrap()
         };
         (value("WIDTH="), value("HEIGHT="))
     }
@@ -255,12 +211,7 @@ impl Program {
     fn ticks(&self) -> u64 {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).unwrap();
         // The name in parentheses may hold anything; `utime` is the twelfth field after it.
-        let fields: Vec<&str> = stat
-            .rsplit_once(')')
-            .unwrap()
-            .1
-            .split_whitespace()
-            .collect();
+        let fields: Vec<&str> = stat.rsplit_once(')').unwrap().1.split_whitespace().collect();
         fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
     }
 }
@@ -273,10 +224,7 @@ impl Drop for Program {
 }
 
 fn colors(picture: &RgbImage) -> usize {
-    picture
-        .pixels()
-        .collect::<std::collections::HashSet<_>>()
-        .len()
+    picture.pixels().collect::<std::collections::HashSet<_>>().len()
 }
 
 /// Share of the pixels that differ.
@@ -296,10 +244,7 @@ fn it_starts_shows_a_picture_and_control_q_ends_it() {
     let mut program = desktop.start(SMALL);
     desktop.wait_until_done(&mut program);
     assert_eq!(desktop.size(&program), (320, 240));
-    assert!(
-        colors(&desktop.shot(&program)) > 50,
-        "the window shows next to nothing"
-    );
+    assert!(colors(&desktop.shot(&program)) > 50, "the window shows next to nothing");
     desktop.xdotool(["key", "ctrl+q"]);
     assert_eq!(program.wait().code(), Some(0));
 }
@@ -316,17 +261,9 @@ fn closing_the_window_ends_it_also_while_it_works() {
     let mut program = desktop.start(&["--resolution", "640x480", "--spp", "100000"]);
     pause(1000);
     let start = Instant::now();
-    desktop
-        .command("wmctrl")
-        .args(["-i", "-c", &program.window])
-        .status()
-        .unwrap();
+    desktop.command("wmctrl").args(["-i", "-c", &program.window]).status().unwrap();
     assert_eq!(program.wait().code(), Some(0));
-    assert!(
-        start.elapsed() < Duration::from_secs(5),
-        "{:?}",
-        start.elapsed()
-    );
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
 }
 
 #[test]
@@ -338,31 +275,19 @@ fn w_moves_the_picture_and_silence_leaves_it() {
     desktop.hide_status(&mut program);
     let before = desktop.shot(&program);
     pause(500);
-    assert_eq!(
-        difference(&before, &desktop.shot(&program)),
-        0.0,
-        "the picture moves by itself"
-    );
+    assert_eq!(difference(&before, &desktop.shot(&program)), 0.0, "the picture moves by itself");
     desktop.xdotool(["keydown", "w"]);
     pause(400);
     desktop.xdotool(["keyup", "w"]);
     pause(100);
     desktop.wait_until_done(&mut program);
     let after = desktop.shot(&program);
-    assert!(
-        difference(&before, &after) > 0.05,
-        "{}",
-        difference(&before, &after)
-    );
+    assert!(difference(&before, &after) > 0.05, "{}", difference(&before, &after));
     // And back again.
     desktop.xdotool(["key", "Return"]);
     pause(100);
     desktop.wait_until_done(&mut program);
-    assert_eq!(
-        difference(&before, &desktop.shot(&program)),
-        0.0,
-        "Enter does not bring the camera back"
-    );
+    assert_eq!(difference(&before, &desktop.shot(&program)), 0.0, "Enter does not bring the camera back");
 }
 
 #[test]
@@ -392,8 +317,7 @@ fn it_survives_storms_of_resizes() {
         return;
     };
     let mut program = desktop.start(&["--resolution", "320x240", "--spp", "16"]);
-    for (count, interval, smallest) in [(400, "0.005", 40), (200, "0.020", 200), (100, "0.005", 1)]
-    {
+    for (count, interval, smallest) in [(400, "0.005", 40), (200, "0.020", 200), (100, "0.005", 1)] {
         let mut steps = Vec::new();
         for i in 0..count {
             let (width, height) = (smallest + i * 37 % 800, smallest + i * 53 % 500);
@@ -406,10 +330,7 @@ fn it_survives_storms_of_resizes() {
             steps.extend(["sleep".to_owned(), interval.to_owned()]);
         }
         desktop.xdotool(steps.iter().map(String::as_str));
-        assert!(
-            program.is_alive(),
-            "after {count} resizes, {interval} s apart"
-        );
+        assert!(program.is_alive(), "after {count} resizes, {interval} s apart");
     }
     desktop.xdotool(["windowsize", "--sync", &program.window, "333", "222"]);
     pause(1000);
@@ -437,13 +358,9 @@ fn it_survives_full_screen_and_minimising() {
     let before = desktop.shot(&program);
     for _ in 0..3 {
         desktop.xdotool(["key", "F11"]);
-        wait_for("full screen", || {
-            (desktop.size(&program) == (1280, 800)).then_some(())
-        });
+        wait_for("full screen", || (desktop.size(&program) == (1280, 800)).then_some(()));
         desktop.xdotool(["key", "F11"]);
-        wait_for("the window", || {
-            (desktop.size(&program) == (320, 240)).then_some(())
-        });
+        wait_for("the window", || (desktop.size(&program) == (320, 240)).then_some(()));
     }
     for _ in 0..3 {
         desktop.xdotool(["windowminimize", &program.window]);
@@ -456,11 +373,7 @@ fn it_survives_full_screen_and_minimising() {
     desktop.wait_until_done(&mut program);
     let after = desktop.shot(&program);
     // The status lines tell other numbers.
-    assert!(
-        difference(&before, &after) < 0.1,
-        "{}",
-        difference(&before, &after)
-    );
+    assert!(difference(&before, &after) < 0.1, "{}", difference(&before, &after));
     desktop.xdotool(["key", "ctrl+q"]);
     assert_eq!(program.wait().code(), Some(0));
 }
@@ -476,11 +389,7 @@ fn a_finished_picture_costs_no_cpu_time() {
     let before = program.ticks();
     pause(2000);
     let ticks = program.ticks() - before;
-    assert!(
-        ticks < 4,
-        "{} % CPU at rest",
-        ticks as f64 * 10.0 / 2000.0 * 100.0
-    );
+    assert!(ticks < 4, "{} % CPU at rest", ticks as f64 * 10.0 / 2000.0 * 100.0);
 }
 
 #[test]
@@ -495,9 +404,7 @@ fn screenshots_are_what_the_window_shows() {
         desktop.xdotool(["key", key]);
         wait_for("the file", || {
             let files = pictures_in(&desktop.directory);
-            (files.len() == count)
-                .then(|| files.last().cloned())
-                .flatten()
+            (files.len() == count).then(|| files.last().cloned()).flatten()
         })
     };
     let first = saved("F12", 1);
@@ -527,12 +434,9 @@ fn screenshots_are_what_the_window_shows() {
 
 /// In the order of their numbers (up to nine).
 fn pictures_in(directory: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(directory)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    let mut files: Vec<PathBuf> = entries
-        .filter(|path| path.extension().is_some_and(|e| e == "png"))
-        .collect();
+    let entries = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> =
+        entries.filter(|path| path.extension().is_some_and(|e| e == "png")).collect();
     files.sort();
     files
 }
@@ -547,21 +451,11 @@ fn keys_that_change_nothing_of_the_light_keep_the_samples() {
     let before = desktop.shot(&program);
     desktop.xdotool(["key", "shift+period"]);
     pause(500);
-    assert!(
-        desktop.title(&program).ends_with("- done"),
-        "exposure restarts the accumulation"
-    );
-    assert!(
-        difference(&before, &desktop.shot(&program)) > 0.05,
-        "exposure does nothing"
-    );
+    assert!(desktop.title(&program).ends_with("- done"), "exposure restarts the accumulation");
+    assert!(difference(&before, &desktop.shot(&program)) > 0.05, "exposure does nothing");
     desktop.xdotool(["key", "shift+comma"]);
     pause(500);
-    assert_eq!(
-        difference(&before, &desktop.shot(&program)),
-        0.0,
-        "a stop up and down again is nothing"
-    );
+    assert_eq!(difference(&before, &desktop.shot(&program)), 0.0, "a stop up and down again is nothing");
 }
 
 #[test]

@@ -17,8 +17,10 @@ impl Blas {
     /// that is not finite have no surface and are never hit.
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
-        let kept: Vec<u32> =
-            (0..triangles.len() as u32).into_par_iter().filter(|&i| has_surface(&triangles[i as usize])).collect();
+        let kept: Vec<u32> = (0..triangles.len() as u32)
+            .into_par_iter()
+            .filter(|&i| has_surface(&triangles[i as usize]))
+            .collect();
         let boxes: Vec<Aabb> = kept.par_iter().map(|&i| Aabb::around(&triangles[i as usize])).collect();
         let mut bvh = Bvh::build(&boxes);
         for prim in &mut bvh.prims {

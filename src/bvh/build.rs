@@ -60,11 +60,8 @@ impl Bvh {
         if boxes.is_empty() {
             return Self::default();
         }
-        let mut prims: Vec<Prim> = boxes
-            .iter()
-            .zip(0..)
-            .map(|(&aabb, index)| Prim { aabb, center: aabb.center(), index })
-            .collect();
+        let mut prims: Vec<Prim> =
+            boxes.iter().zip(0..).map(|(&aabb, index)| Prim { aabb, center: aabb.center(), index }).collect();
         let unused = Node { min: Vec3::ZERO, first: 0, max: Vec3::ZERO, count: 0 };
         let mut nodes = vec![unused; 2 * prims.len() - 1];
         let (root, below) = nodes.split_at_mut(1);
@@ -81,7 +78,14 @@ impl Bvh {
 
 /// Makes `node` the root over `prims`, whose list starts at `first_prim`, putting its descendants into
 /// `below`, which starts at index `base` of the final array and has room for 2 · `prims.len()` − 2.
-fn split(node: &mut Node, below: &mut [Node], base: usize, prims: &mut [Prim], first_prim: usize, depth: usize) {
+fn split(
+    node: &mut Node,
+    below: &mut [Node],
+    base: usize,
+    prims: &mut [Prim],
+    first_prim: usize,
+    depth: usize,
+) {
     let (bounds, centers) = extent(prims);
     let cut = if depth < SAH_LEVELS { sah_cut(prims, &bounds, &centers) } else { Cut::Halves };
     let middle = match cut {
@@ -107,7 +111,8 @@ fn split(node: &mut Node, below: &mut [Node], base: usize, prims: &mut [Prim], f
     let left_base = base + 2;
     let right_base = left_base + left_below.len();
     let mut go_left = || split(&mut left[0], left_below, left_base, left_prims, first_prim, depth + 1);
-    let mut go_right = || split(&mut right[0], right_below, right_base, right_prims, first_prim + middle, depth + 1);
+    let mut go_right =
+        || split(&mut right[0], right_below, right_base, right_prims, first_prim + middle, depth + 1);
     if parallel {
         rayon::join(go_left, go_right);
     } else {
@@ -189,7 +194,9 @@ fn sah_cut(prims: &[Prim], bounds: &Aabb, centers: &Aabb) -> Cut {
     let leaf_cost = area * prims.len() as f32;
     match best {
         // A large list is split even if its cost overflows.
-        Some((cost, plane)) if prims.len() > MAX_LEAF || NODE_COST * area + cost < leaf_cost => Cut::Plane(plane),
+        Some((cost, plane)) if prims.len() > MAX_LEAF || NODE_COST * area + cost < leaf_cost => {
+            Cut::Plane(plane)
+        }
         Some(_) => Cut::Leaf,
         None => Cut::Halves,
     }

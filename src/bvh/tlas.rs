@@ -72,7 +72,9 @@ impl Placement {
             return local;
         }
         (0..8).fold(Aabb::EMPTY, |aabb, corner| {
-            let pick = |axis: usize| f64::from(if corner >> axis & 1 == 0 { local.min[axis] } else { local.max[axis] });
+            let pick = |axis: usize| {
+                f64::from(if corner >> axis & 1 == 0 { local.min[axis] } else { local.max[axis] })
+            };
             let p = self.world_from_local.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
             let p = p.clamp(DVec3::splat(f64::from(f32::MIN)), DVec3::splat(f64::from(f32::MAX))).as_vec3();
             aabb.union(Aabb { min: p.map(f32::next_down), max: p.map(f32::next_up) })

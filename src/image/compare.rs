@@ -57,10 +57,12 @@ impl LinearImage {
     /// # Errors
     /// If it cannot be read or decoded.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
-        let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.to_path_buf(), source })?;
+        let bytes =
+            std::fs::read(path).map_err(|source| ImageError::Io { path: path.to_path_buf(), source })?;
         let image = image::load_from_memory(&bytes)
             .map_err(|source| ImageError::Codec { path: path.to_path_buf(), source })?;
-        let linear = matches!(image, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
+        let linear =
+            matches!(image, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
         let decode = |c: f32| if linear { c } else { linear_from_srgb(c) };
         let image = image.into_rgb32f();
         let pixels = image.pixels().map(|p| Vec3::from_array(p.0.map(decode))).collect();

@@ -1,9 +1,9 @@
 //! Linear radiance → bytes on a screen: exposure, tone map, sRGB, dither. Never touches the film.
 
-use bevy_ecs::prelude::*;
 use crate::scene::color::{luminance, srgb_from_linear};
 use crate::trace::Film;
 use crate::trace::sampler::{hash, unit_float};
+use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 use std::sync::LazyLock;
@@ -81,7 +81,8 @@ pub fn develop(film: &Film, coarse: Option<&Film>, display: &Display) -> Vec<u8>
     let size = film.size();
     let gain = display.exposure.exp2();
     // The coarse picture is developed as it is, then its bytes are repeated.
-    let coarse = coarse.filter(|_| film.complete_samples() == 0).map(|c| (c.size(), develop(c, None, display)));
+    let coarse =
+        coarse.filter(|_| film.complete_samples() == 0).map(|c| (c.size(), develop(c, None, display)));
     let mut bytes = vec![255; size.element_product() as usize * 4];
     bytes.par_chunks_exact_mut(size.x as usize * 4).zip(0..size.y).for_each(|(row, y)| {
         for ((x, pixel), rgba) in (0..size.x).zip(film.row(y)).zip(row.chunks_exact_mut(4)) {
@@ -109,8 +110,9 @@ pub fn develop(film: &Film, coarse: Option<&Film>, display: &Display) -> Vec<u8>
 /// between 4,097 entries it is off by less than 0.001 levels, at a tenth of the cost.
 struct SrgbLevels([f32; 4098]);
 
-static SRGB_LEVELS: LazyLock<SrgbLevels> =
-    LazyLock::new(|| SrgbLevels(std::array::from_fn(|i| 255.0 * srgb_from_linear((i as f32 / 4096.0).powi(2)))));
+static SRGB_LEVELS: LazyLock<SrgbLevels> = LazyLock::new(|| {
+    SrgbLevels(std::array::from_fn(|i| 255.0 * srgb_from_linear((i as f32 / 4096.0).powi(2))))
+});
 
 impl SrgbLevels {
     fn at(&self, linear: f32) -> f32 {
@@ -158,7 +160,10 @@ mod tests {
             for tone_map in [ToneMap::Clip, ToneMap::Neutral] {
                 let bytes = develop(&film, None, &Display { exposure: 20.0, tone_map });
                 // The neutral curve only nears white; dither may take the last level.
-                assert!(bytes[0].abs_diff(byte) <= u8::from(tone_map == ToneMap::Neutral), "{radiance} {tone_map:?}: {bytes:?}");
+                assert!(
+                    bytes[0].abs_diff(byte) <= u8::from(tone_map == ToneMap::Neutral),
+                    "{radiance} {tone_map:?}: {bytes:?}"
+                );
             }
         }
     }

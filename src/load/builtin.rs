@@ -17,55 +17,15 @@ pub struct BuiltIn {
 #[must_use]
 pub fn built_in_scenes() -> &'static [BuiltIn] {
     const fn scene(name: &'static str, file: &'static str, description: &'static str) -> BuiltIn {
-        BuiltIn {
-            name,
-            description,
-            file,
-        }
+        BuiltIn { name, description, file }
     }
     &[
-        const {
-            scene(
-                "cornell",
-                "cornell.toml",
-                "the Cornell box under its area light",
-            )
-        },
-        const {
-            scene(
-                "cornell-point",
-                "cornell-point.toml",
-                "the same room under a point light: hard shadows",
-            )
-        },
-        const {
-            scene(
-                "cornell-gltf",
-                "cornell.gltf",
-                "the same room as glTF, lit by an emissive mesh",
-            )
-        },
-        const {
-            scene(
-                "gallery",
-                "gallery.toml",
-                "every shape of light, each in its own bay with its shadow",
-            )
-        },
-        const {
-            scene(
-                "bust",
-                "bust.toml",
-                "a smooth owl's head of 968 triangles under a large light",
-            )
-        },
-        const {
-            scene(
-                "checker",
-                "checker.toml",
-                "one texture twice: nearest beside bilinear",
-            )
-        },
+        const { scene("cornell", "cornell.toml", "the Cornell box under its area light") },
+        const { scene("cornell-point", "cornell-point.toml", "the same room under a point light: hard shadows") },
+        const { scene("cornell-gltf", "cornell.gltf", "the same room as glTF, lit by an emissive mesh") },
+        const { scene("gallery", "gallery.toml", "every shape of light, each in its own bay with its shadow") },
+        const { scene("bust", "bust.toml", "a smooth owl's head of 968 triangles under a large light") },
+        const { scene("checker", "checker.toml", "one texture twice: nearest beside bilinear") },
         const { scene("mirrors", "mirrors.toml", "mirrors, metal, gloss and glass") },
     ]
 }
@@ -113,11 +73,7 @@ pub(super) fn unknown(argument: &str) -> LoadError {
         Some((distance, name)) if distance <= 3 => format!("; did you mean `{name}`?"),
         _ => String::new(),
     };
-    LoadError::UnknownScene {
-        argument: argument.to_owned(),
-        hint,
-        names: names.join(", "),
-    }
+    LoadError::UnknownScene { argument: argument.to_owned(), hint, names: names.join(", ") }
 }
 
 /// Letters to insert, remove or change to get from one word to the other (Levenshtein).

@@ -16,9 +16,7 @@ pub enum LoadError {
         source: ReadError,
     },
     /// Neither a file nor a built-in scene.
-    #[error(
-        "{argument}: no such file, and no built-in scene of that name{hint}; built-in scenes: {names}"
-    )]
+    #[error("{argument}: no such file, and no built-in scene of that name{hint}; built-in scenes: {names}")]
     UnknownScene {
         /// What was asked for.
         argument: String,
@@ -90,10 +88,6 @@ pub enum ReadError {
 impl LoadError {
     /// [`LoadError::Broken`] from anything printable.
     pub(super) fn broken(file: &str, place: impl Display, problem: impl Display) -> Self {
-        Self::Broken {
-            file: file.to_owned(),
-            place: place.to_string(),
-            problem: problem.to_string(),
-        }
+        Self::Broken { file: file.to_owned(), place: place.to_string(), problem: problem.to_string() }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::report::Sink;
 use crate::scene::{
-    ActiveCamera, Camera, GlobalTransform, Instance, Light, Material, Mesh, Projection,
-    SceneBounds, Transform, Visible, propagate_transforms,
+    ActiveCamera, Camera, GlobalTransform, Instance, Light, Material, Mesh, Projection, SceneBounds,
+    Transform, Visible, propagate_transforms,
 };
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -28,25 +28,15 @@ pub(super) fn complete(file: &str, camera: Option<Entity>, sink: &mut Sink<'_>) 
     propagate(sink.world);
     drop_far_instances(file, sink);
     let survey = survey(sink.world);
-    let bounds = survey.bounds.unwrap_or(Box3 {
-        min: DVec3::splat(-1.0),
-        max: DVec3::ONE,
-    });
+    let bounds = survey.bounds.unwrap_or(Box3 { min: DVec3::splat(-1.0), max: DVec3::ONE });
     let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-30);
-    let ball = SceneBounds {
-        center: 0.5 * (bounds.min + bounds.max),
-        radius,
-    };
+    let ball = SceneBounds { center: 0.5 * (bounds.min + bounds.max), radius };
     sink.world.insert_resource(ball);
     if survey.bounds.is_none() {
-        sink.warn(format!(
-            "{file}: no triangle to see in it: the picture will be empty"
-        ));
+        sink.warn(format!("{file}: no triangle to see in it: the picture will be empty"));
     }
     let first = sink.report.cameras.first().map(|&(_, camera)| camera);
-    let active = camera
-        .or(first)
-        .unwrap_or_else(|| frame(file, &survey, &bounds, ball, sink));
+    let active = camera.or(first).unwrap_or_else(|| frame(file, &survey, &bounds, ball, sink));
     sink.world.insert_resource(ActiveCamera(active));
     if !has_light(sink.world) {
         add_light(file, active, ball, sink);
@@ -85,11 +75,8 @@ struct Sample {
 fn survey(world: &mut World) -> Survey {
     let query = world.query::<(&Instance, &GlobalTransform)>();
     let meshes = |instance: &Instance| world.get::<Mesh>(instance.mesh).map(|mesh| &mesh.0);
-    let total: usize = query
-        .iter_manual(world)
-        .filter_map(|(i, _)| meshes(i))
-        .map(|mesh| mesh.triangles.len())
-        .sum();
+    let total: usize =
+        query.iter_manual(world).filter_map(|(i, _)| meshes(i)).map(|mesh| mesh.triangles.len()).sum();
     let step = total.div_ceil(MOST_SAMPLES).max(1);
     let mut samples = Vec::with_capacity(3 * total / step + 3);
     let (mut all, mut area_sum, mut normal_sum) = (None::<Box3>, 0.0, DVec3::ZERO);
@@ -102,55 +89,32 @@ fn survey(world: &mut World) -> Survey {
         let skip = (step - count % step) % step;
         count += mesh.triangles.len();
         for i in (skip..mesh.triangles.len()).step_by(step) {
-            let corners = mesh
-                .corners(i)
-                .map(|p| transform.0.transform_point3(p.as_dvec3()));
+            let corners = mesh.corners(i).map(|p| transform.0.transform_point3(p.as_dvec3()));
             let normal = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let area = normal.length();
             area_sum += area;
             normal_sum += normal;
             for corner in corners {
-                let known = all.unwrap_or(Box3 {
-                    min: corner,
-                    max: corner,
-                });
-                all = Some(Box3 {
-                    min: known.min.min(corner),
-                    max: known.max.max(corner),
-                });
+                let known = all.unwrap_or(Box3 { min: corner, max: corner });
+                all = Some(Box3 { min: known.min.min(corner), max: known.max.max(corner) });
                 samples.push(Sample { corner, area });
             }
         }
     }
-    let facing = if area_sum > 0.0 {
-        normal_sum / area_sum
-    } else {
-        DVec3::ZERO
-    };
+    let facing = if area_sum > 0.0 { normal_sum / area_sum } else { DVec3::ZERO };
     let Some(all) = all else {
-        return Survey {
-            bounds: None,
-            facing,
-            trimmed: false,
-        };
+        return Survey { bounds: None, facing, trimmed: false };
     };
     let core = trimmed(&mut samples);
     // Only far outliers are worth cutting off: they would leave the rest a speck.
     let is_far = (all.max - all.min).length() > 4.0 * (core.max - core.min).length();
-    Survey {
-        bounds: Some(if is_far { core } else { all }),
-        facing,
-        trimmed: is_far,
-    }
+    Survey { bounds: Some(if is_far { core } else { all }), facing, trimmed: is_far }
 }
 
 /// The box between the first and last hundredth of the area along each axis.
 fn trimmed(samples: &mut [Sample]) -> Box3 {
     let total: f64 = samples.iter().map(|sample| sample.area).sum();
-    let mut core = Box3 {
-        min: DVec3::ZERO,
-        max: DVec3::ZERO,
-    };
+    let mut core = Box3 { min: DVec3::ZERO, max: DVec3::ZERO };
     for axis in 0..3 {
         samples.sort_unstable_by(|a, b| a.corner[axis].total_cmp(&b.corner[axis]));
         core.min[axis] = inner_edge(samples.iter(), axis, OUTLIERS * total);
@@ -176,18 +140,8 @@ fn drop_far_instances(file: &str, sink: &mut Sink<'_>) {
     let query = sink.world.query::<(Entity, &Instance, &GlobalTransform)>();
     let is_far = |instance: &Instance, transform: &GlobalTransform| {
         let mesh = sink.world.get::<Mesh>(instance.mesh)?;
-        let bounds = mesh
-            .0
-            .positions
-            .iter()
-            .filter(|p| p.is_finite())
-            .map(|p| p.abs())
-            .reduce(Vec3::max)?;
-        let columns = [
-            transform.0.matrix3.x_axis,
-            transform.0.matrix3.y_axis,
-            transform.0.matrix3.z_axis,
-        ];
+        let bounds = mesh.0.positions.iter().filter(|p| p.is_finite()).map(|p| p.abs()).reduce(Vec3::max)?;
+        let columns = [transform.0.matrix3.x_axis, transform.0.matrix3.y_axis, transform.0.matrix3.z_axis];
         let [x, y, z] = bounds.as_dvec3().to_array();
         let reach = columns[0].abs() * x
             + columns[1].abs() * y
@@ -213,20 +167,10 @@ fn drop_far_instances(file: &str, sink: &mut Sink<'_>) {
 
 /// A camera that shows the whole box, from the front, above and right; straight from the open side
 /// of a room or the face of a flat thing.
-fn frame(
-    file: &str,
-    survey: &Survey,
-    bounds: &Box3,
-    ball: SceneBounds,
-    sink: &mut Sink<'_>,
-) -> Entity {
+fn frame(file: &str, survey: &Survey, bounds: &Box3, ball: SceneBounds, sink: &mut Sink<'_>) -> Entity {
     let flat = DVec3::new(survey.facing.x, 0.0, survey.facing.z);
     let one_sided = flat.length() > ONE_SIDED;
-    let back = if one_sided {
-        flat.normalize()
-    } else {
-        DVec3::new(0.45, 0.4, 1.0).normalize()
-    };
+    let back = if one_sided { flat.normalize() } else { DVec3::new(0.45, 0.4, 1.0).normalize() };
     let view = Transform::looking_at(back, DVec3::ZERO, DVec3::Y).0.matrix3;
     let vertical_fov = 40.0_f64.to_radians();
     let slope = 0.95 * (0.5 * vertical_fov).tan();
@@ -239,25 +183,13 @@ fn frame(
         })
         .fold(ball.radius * 1e-3, f64::max);
     let transform = Transform::looking_at(ball.center + back * distance, ball.center, DVec3::Y);
-    let projection = Projection::Perspective {
-        vertical_fov: vertical_fov as f32,
-    };
+    let projection = Projection::Perspective { vertical_fov: vertical_fov as f32 };
     let name = "framing camera";
     let camera = sink.spawn((Name::new(name), transform, Camera { projection }));
     sink.report.cameras.push((name.to_owned(), camera));
-    let side = if one_sided {
-        "the side its surfaces face"
-    } else {
-        "the front, above and right"
-    };
-    let rest = if survey.trimmed {
-        "; far outliers are outside the picture"
-    } else {
-        ""
-    };
-    sink.decide(format!(
-        "{file}: no camera in it; looks at the whole scene from {side}{rest}"
-    ));
+    let side = if one_sided { "the side its surfaces face" } else { "the front, above and right" };
+    let rest = if survey.trimmed { "; far outliers are outside the picture" } else { "" };
+    sink.decide(format!("{file}: no camera in it; looks at the whole scene from {side}{rest}"));
     camera
 }
 
@@ -271,28 +203,18 @@ fn has_light(world: &mut World) -> bool {
         return true;
     }
     let instances = world.query::<&Instance>();
-    let shines = |&material: &Entity| {
-        world
-            .get::<Material>(material)
-            .is_some_and(|m| m.emission != Vec3::ZERO)
-    };
-    instances
-        .iter_manual(world)
-        .any(|instance| instance.materials.iter().any(shines))
+    let shines =
+        |&material: &Entity| world.get::<Material>(material).is_some_and(|m| m.emission != Vec3::ZERO);
+    instances.iter_manual(world).any(|instance| instance.materials.iter().any(shines))
 }
 
 /// A key light up-left behind the camera, large enough for soft shadows, and a dim environment.
 fn add_light(file: &str, camera: Entity, ball: SceneBounds, sink: &mut Sink<'_>) {
     propagate(sink.world);
-    let view = sink
-        .world
-        .get::<GlobalTransform>(camera)
-        .map_or_else(Default::default, |t| t.0);
+    let view = sink.world.get::<GlobalTransform>(camera).map_or_else(Default::default, |t| t.0);
     let back = view.matrix3.z_axis.try_normalize().unwrap_or(DVec3::Z);
     let right = view.matrix3.x_axis.try_normalize().unwrap_or(DVec3::X);
-    let towards = (back - 0.7 * right + DVec3::Y)
-        .try_normalize()
-        .unwrap_or(DVec3::Y);
+    let towards = (back - 0.7 * right + DVec3::Y).try_normalize().unwrap_or(DVec3::Y);
     let distance = 3.0 * ball.radius;
     let edge = 1.2 * ball.radius;
     // A white surface at the centre that faces the light shows radiance * area / (π distance²).
@@ -309,9 +231,7 @@ fn add_light(file: &str, camera: Entity, ball: SceneBounds, sink: &mut Sink<'_>)
     sink.spawn((
         Name::new("environment"),
         Transform::default(),
-        Light::Environment {
-            radiance: Vec3::splat(FILL_RADIANCE),
-        },
+        Light::Environment { radiance: Vec3::splat(FILL_RADIANCE) },
     ));
     sink.decide(format!("{file}: no light in it; a soft key light shines from up left behind the camera, with a dim environment"));
 }

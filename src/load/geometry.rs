@@ -40,27 +40,14 @@ impl Mended {
     /// One line for each kind.
     pub(super) fn lines(&self) -> Vec<String> {
         let kinds = [
-            (
-                self.not_finite,
-                "triangles dropped: a position is not finite",
-            ),
-            (
-                self.too_far,
-                "triangles dropped: a position is beyond the range of 1e18",
-            ),
+            (self.not_finite, "triangles dropped: a position is not finite"),
+            (self.too_far, "triangles dropped: a position is beyond the range of 1e18"),
             (self.without_area, "triangles without area dropped"),
-            (
-                self.normals,
-                "vertex normals zero or not finite, replaced by those of the faces",
-            ),
+            (self.normals, "vertex normals zero or not finite, replaced by those of the faces"),
             (self.uvs, "texture coordinates not finite, set to 0"),
             (self.colors, "vertex colours not finite, set to white"),
         ];
-        kinds
-            .iter()
-            .filter(|(count, _)| *count > 0)
-            .map(|(count, what)| format!("{count} {what}"))
-            .collect()
+        kinds.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect()
     }
 }
 
@@ -78,26 +65,19 @@ pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
         }
         let first = mesh.positions.len() as u32;
         let count = part.positions.len();
-        mesh.triangles.extend(
-            part.triangles
-                .iter()
-                .map(|corners| corners.map(|corner| first + corner)),
-        );
+        mesh.triangles.extend(part.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
         if several_slots {
             mesh.slots.resize(mesh.triangles.len(), part.slot);
         }
         mesh.positions.append(&mut part.positions);
         if any_normals {
-            mesh.normals
-                .extend(part.normals.unwrap_or_else(|| vec![Vec3::ZERO; count]));
+            mesh.normals.extend(part.normals.unwrap_or_else(|| vec![Vec3::ZERO; count]));
         }
         if any_uvs {
-            mesh.uvs
-                .extend(part.uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
+            mesh.uvs.extend(part.uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
         }
         if any_colors {
-            mesh.colors
-                .extend(part.colors.unwrap_or_else(|| vec![Vec4::ONE; count]));
+            mesh.colors.extend(part.colors.unwrap_or_else(|| vec![Vec4::ONE; count]));
         }
     }
     mesh
@@ -105,31 +85,15 @@ pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
 
 /// Three vertices of its own for each triangle, with the normal of the face.
 fn faceted(part: &Part) -> Part {
-    let corners = || {
-        part.triangles
-            .iter()
-            .flatten()
-            .map(|&corner| corner as usize)
-    };
+    let corners = || part.triangles.iter().flatten().map(|&corner| corner as usize);
     let positions: Vec<Vec3> = corners().map(|corner| part.positions[corner]).collect();
     let (faces, _) = positions.as_chunks::<3>();
-    let normals = faces
-        .iter()
-        .flat_map(|&face| [unit_normal(face).unwrap_or(Vec3::ZERO); 3])
-        .collect();
+    let normals = faces.iter().flat_map(|&face| [unit_normal(face).unwrap_or(Vec3::ZERO); 3]).collect();
     Part {
         normals: Some(normals),
-        uvs: part
-            .uvs
-            .as_ref()
-            .map(|uvs| corners().map(|corner| uvs[corner]).collect()),
-        colors: part
-            .colors
-            .as_ref()
-            .map(|colors| corners().map(|corner| colors[corner]).collect()),
-        triangles: (0..part.triangles.len() as u32)
-            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-            .collect(),
+        uvs: part.uvs.as_ref().map(|uvs| corners().map(|corner| uvs[corner]).collect()),
+        colors: part.colors.as_ref().map(|colors| corners().map(|corner| colors[corner]).collect()),
+        triangles: (0..part.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         positions,
         slot: part.slot,
     }
@@ -140,23 +104,15 @@ pub(super) fn unit_normal(corners: [Vec3; 3]) -> Option<Vec3> {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let (ab, ac) = (b - a, c - a);
     let longest = ab.abs().max_element().max(ac.abs().max_element());
-    (ab / longest)
-        .cross(ac / longest)
-        .try_normalize()
-        .map(DVec3::as_vec3)
+    (ab / longest).cross(ac / longest).try_normalize().map(DVec3::as_vec3)
 }
 
 /// Drops what cannot be traced and mends what can, so that every promise of [`TriangleMesh`] holds.
 pub(super) fn finish(mut mesh: TriangleMesh) -> Finished {
     let not_finite = retain(&mut mesh, |corners| corners.iter().all(|p| p.is_finite()));
-    let mut mended = Mended {
-        not_finite,
-        ..Mended::default()
-    };
+    let mut mended = Mended { not_finite, ..Mended::default() };
     let triangles = mesh.triangles.len();
-    mended.too_far = retain(&mut mesh, |corners| {
-        corners.iter().all(|p| p.abs().max_element() <= FAR)
-    });
+    mended.too_far = retain(&mut mesh, |corners| corners.iter().all(|p| p.abs().max_element() <= FAR));
     mended.without_area = mesh.drop_degenerate();
     mend_normals(&mut mesh, &mut mended);
     for uv in &mut mesh.uvs {
@@ -172,18 +128,12 @@ pub(super) fn finish(mut mesh: TriangleMesh) -> Finished {
         }
         *color = color.clamp(Vec4::ZERO, Vec4::ONE);
     }
-    Finished {
-        mesh,
-        triangles,
-        mended,
-    }
+    Finished { mesh, triangles, mended }
 }
 
 /// Keeps the triangles whose corners pass; returns how many do not.
 fn retain(mesh: &mut TriangleMesh, mut pass: impl FnMut([Vec3; 3]) -> bool) -> usize {
-    let keep: Vec<bool> = (0..mesh.triangles.len())
-        .map(|i| pass(mesh.corners(i)))
-        .collect();
+    let keep: Vec<bool> = (0..mesh.triangles.len()).map(|i| pass(mesh.corners(i))).collect();
     let dropped = keep.iter().filter(|&&kept| !kept).count();
     if dropped > 0 {
         let mut kept = keep.iter().copied();
@@ -217,13 +167,7 @@ fn mend_normals(mesh: &mut TriangleMesh, mended: &mut Mended) {
             sums[corner as usize] += (b - a).cross(c - a);
         }
     }
-    for ((normal, sum), _) in mesh
-        .normals
-        .iter_mut()
-        .zip(sums)
-        .zip(broken)
-        .filter(|(_, broken)| *broken)
-    {
+    for ((normal, sum), _) in mesh.normals.iter_mut().zip(sums).zip(broken).filter(|(_, broken)| *broken) {
         *normal = sum.try_normalize().unwrap_or(DVec3::Y).as_vec3();
     }
 }
@@ -234,9 +178,7 @@ mod tests {
 
     fn triangle(offset: f32) -> Part {
         Part {
-            positions: [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]]
-                .map(|p| Vec3::from(p) + offset)
-                .to_vec(),
+            positions: [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]].map(|p| Vec3::from(p) + offset).to_vec(),
             triangles: vec![[0, 1, 2]],
             ..Part::default()
         }
@@ -244,11 +186,7 @@ mod tests {
 
     #[test]
     fn a_part_without_normals_gets_face_normals_beside_one_with() {
-        let smooth = Part {
-            normals: Some(vec![Vec3::X; 3]),
-            slot: 1,
-            ..triangle(0.0)
-        };
+        let smooth = Part { normals: Some(vec![Vec3::X; 3]), slot: 1, ..triangle(0.0) };
         let mesh = merge(vec![smooth, triangle(5.0)]);
         assert_eq!(mesh.normals, [[Vec3::X; 3], [Vec3::Z; 3]].concat());
         assert_eq!(mesh.slots, [1, 0]);
@@ -268,10 +206,8 @@ mod tests {
 
     #[test]
     fn zero_normals_become_face_normals() {
-        let part = Part {
-            normals: Some(vec![Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X * 3.0]),
-            ..triangle(0.0)
-        };
+        let part =
+            Part { normals: Some(vec![Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X * 3.0]), ..triangle(0.0) };
         let done = finish(merge(vec![part]));
         assert_eq!(done.mesh.normals, [Vec3::Z, Vec3::Z, Vec3::X]);
     }

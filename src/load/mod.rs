@@ -65,10 +65,9 @@ impl SceneSource {
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::File(path) => path.file_stem().map_or_else(
-                || "scene".to_owned(),
-                |stem| stem.to_string_lossy().into_owned(),
-            ),
+            Self::File(path) => path
+                .file_stem()
+                .map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
             Self::BuiltIn(name) => (*name).to_owned(),
         }
     }
@@ -85,11 +84,7 @@ pub struct LoadOptions {
 ///
 /// # Errors
 /// A [`LoadError`] that names the file and the place in it; then nothing was added to the world.
-pub fn load(
-    world: &mut World,
-    source: &SceneSource,
-    options: &LoadOptions,
-) -> Result<LoadReport, LoadError> {
+pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> Result<LoadReport, LoadError> {
     let mut sink = Sink::new(world);
     match load_into(source, options, &mut sink) {
         Ok(()) => Ok(sink.finish()),
@@ -100,11 +95,7 @@ pub fn load(
     }
 }
 
-fn load_into(
-    source: &SceneSource,
-    options: &LoadOptions,
-    sink: &mut Sink<'_>,
-) -> Result<(), LoadError> {
+fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -> Result<(), LoadError> {
     let (file, folder, bytes) = open(source)?;
     let format = Format::of(&file, &bytes)?;
     let mut settings = Vec::new();
@@ -120,13 +111,9 @@ fn load_into(
     }
     let models = match settings.first() {
         Some(own) if format == Format::Settings => own.models(&mut materials)?,
-        _ => vec![Model {
-            file: file.clone(),
-            folder,
-            bytes,
-            transform: Transform::default(),
-            material: None,
-        }],
+        _ => {
+            vec![Model { file: file.clone(), folder, bytes, transform: Transform::default(), material: None }]
+        }
     };
     for model in models {
         load_model(model, &mut materials, sink)?;
@@ -135,9 +122,8 @@ fn load_into(
         settings.spawn_lights(sink)?;
     }
     for name in materials.unused() {
-        let line = format!(
-            "{file}: [material.{name}] in the settings: no material of that name in the scene"
-        );
+        let line =
+            format!("{file}: [material.{name}] in the settings: no material of that name in the scene");
         sink.warn(line);
     }
     framing::complete(&file, active, sink);
@@ -154,17 +140,13 @@ enum Format {
 
 impl Format {
     fn of(file: &str, bytes: &[u8]) -> Result<Self, LoadError> {
-        let ending = Path::new(file)
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_lowercase());
+        let ending = Path::new(file).extension().map(|ending| ending.to_string_lossy().to_lowercase());
         match ending.as_deref() {
             Some("gltf" | "glb") => Ok(Self::Gltf),
             Some("obj") => Ok(Self::Obj),
             Some("toml") => Ok(Self::Settings),
             _ if bytes.starts_with(b"glTF") => Ok(Self::Gltf),
-            _ => Err(LoadError::UnknownFormat {
-                file: file.to_owned(),
-            }),
+            _ => Err(LoadError::UnknownFormat { file: file.to_owned() }),
         }
     }
 }
@@ -179,8 +161,7 @@ fn open(source: &SceneSource) -> Result<(String, Folder, Bytes), LoadError> {
             }
         }
         SceneSource::BuiltIn(name) => {
-            let found = builtin::find(name)
-                .and_then(|scene| Some((scene.file, builtin::asset(scene.file)?)));
+            let found = builtin::find(name).and_then(|scene| Some((scene.file, builtin::asset(scene.file)?)));
             let (file, bytes) = found.ok_or_else(|| builtin::unknown(name))?;
             Ok((file.to_owned(), Folder::BuiltIn, Bytes::Borrowed(bytes)))
         }
@@ -205,10 +186,8 @@ fn sidecar(
         return Ok(None);
     }
     let file = path.to_string_lossy().into_owned();
-    let bytes = source::read_file(&path, TEXT_LIMIT).map_err(|source| LoadError::Read {
-        file: file.clone(),
-        source,
-    })?;
+    let bytes = source::read_file(&path, TEXT_LIMIT)
+        .map_err(|source| LoadError::Read { file: file.clone(), source })?;
     let settings = Settings::parse(&file, Folder::of(&path), &bytes)?;
     if settings.has_models() && !asked_for {
         sink.decide(format!(
@@ -217,44 +196,23 @@ fn sidecar(
         return Ok(None);
     }
     if settings.has_models() {
-        sink.warn(format!(
-            "{file}: its [[model]] tables are ignored; open the file itself to see them"
-        ));
+        sink.warn(format!("{file}: its [[model]] tables are ignored; open the file itself to see them"));
     } else {
         sink.decide(format!("{file}: settings read"));
     }
     Ok(Some(settings))
 }
 
-fn load_model(
-    model: Model,
-    materials: &mut Materials,
-    sink: &mut Sink<'_>,
-) -> Result<(), LoadError> {
+fn load_model(model: Model, materials: &mut Materials, sink: &mut Sink<'_>) -> Result<(), LoadError> {
     let format = Format::of(&model.file, &model.bytes)?;
-    let stem = Path::new(&model.file).file_stem().map_or_else(
-        || model.file.clone(),
-        |stem| stem.to_string_lossy().into_owned(),
-    );
+    let stem = Path::new(&model.file)
+        .file_stem()
+        .map_or_else(|| model.file.clone(), |stem| stem.to_string_lossy().into_owned());
     let root = sink.spawn((Name::new(stem), model.transform));
     materials.all = model.material;
     match format {
-        Format::Gltf => gltf::load(
-            &model.file,
-            &model.folder,
-            model.bytes,
-            root,
-            materials,
-            sink,
-        )?,
-        Format::Obj => obj::load(
-            &model.file,
-            &model.folder,
-            model.bytes,
-            root,
-            materials,
-            sink,
-        )?,
+        Format::Gltf => gltf::load(&model.file, &model.folder, model.bytes, root, materials, sink)?,
+        Format::Obj => obj::load(&model.file, &model.folder, model.bytes, root, materials, sink)?,
         Format::Settings => return Err(LoadError::UnknownFormat { file: model.file }),
     }
     materials.all = None;

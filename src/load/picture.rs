@@ -26,21 +26,12 @@ pub(super) struct Picture<'a> {
 }
 
 /// Decodes all pictures side by side; `file` is the scene that names them.
-pub(super) fn decode_all(
-    file: &str,
-    pictures: &[Picture<'_>],
-    sink: &mut Sink<'_>,
-) -> Vec<Arc<Texels>> {
+pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Arc<Texels>> {
     let mut budget = MOST_TEXELS_TOGETHER;
     let affordable: Vec<bool> = pictures
         .iter()
         .map(|picture| {
-            let texels = picture
-                .bytes
-                .as_ref()
-                .ok()
-                .and_then(|bytes| texel_count(bytes))
-                .unwrap_or(0);
+            let texels = picture.bytes.as_ref().ok().and_then(|bytes| texel_count(bytes)).unwrap_or(0);
             let fits = texels <= budget;
             budget -= if fits { texels } else { 0 };
             fits
@@ -53,9 +44,7 @@ pub(super) fn decode_all(
             let mut remarks = Vec::new();
             let result = match &picture.bytes {
                 Err(why) => Err(format!("image {why}")),
-                Ok(_) if !affordable => {
-                    Err("image left out: the pictures together are too large".to_owned())
-                }
+                Ok(_) if !affordable => Err("image left out: the pictures together are too large".to_owned()),
                 Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
             };
             let texels = result.unwrap_or_else(|why| {
@@ -80,28 +69,13 @@ pub(super) fn decode_all(
 /// Magenta and black: what is missing should be seen.
 pub(super) fn stand_in() -> Texels {
     let (magenta, black) = ([255, 0, 255, 255], [0, 0, 0, 255]);
-    let texels = (0..64)
-        .map(|i| {
-            if (i % 8 + i / 8) % 2 == 0 {
-                magenta
-            } else {
-                black
-            }
-        })
-        .collect();
-    Texels {
-        width: 8,
-        height: 8,
-        texels,
-    }
+    let texels = (0..64).map(|i| if (i % 8 + i / 8) % 2 == 0 { magenta } else { black }).collect();
+    Texels { width: 8, height: 8, texels }
 }
 
 fn texel_count(bytes: &[u8]) -> Option<u64> {
-    let (width, height) = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .ok()?
-        .into_dimensions()
-        .ok()?;
+    let (width, height) =
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
 }
 
@@ -116,15 +90,8 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texel
     let Some(format) = reader.format() else {
         return Err("image format not recognised".to_owned());
     };
-    if strict
-        && !matches!(
-            format,
-            ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP
-        )
-    {
-        remarks.push(format!(
-            "image format {format:?} is not allowed in glTF; used all the same"
-        ));
+    if strict && !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP) {
+        remarks.push(format!("image format {format:?} is not allowed in glTF; used all the same"));
     }
     if format == ImageFormat::Jpeg && !has_jpeg_end(bytes) {
         remarks.push("JPEG image is truncated; the missing part is grey".to_owned());
@@ -136,32 +103,22 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texel
         return Err("image is empty (0 texels)".to_owned());
     }
     if texels > MOST_TEXELS {
-        return Err(format!(
-            "image of {width} x {height} is too large (limit {MOST_TEXELS} texels)"
-        ));
+        return Err(format!("image of {width} x {height} is too large (limit {MOST_TEXELS} texels)"));
     }
     let mut limits = Limits::default();
     limits.max_alloc = Some(16 * MOST_TEXELS);
-    decoder
-        .set_limits(limits)
-        .map_err(|error| describe(&error))?;
+    decoder.set_limits(limits).map_err(|error| describe(&error))?;
     if format == ImageFormat::Jpeg && jpeg_components(bytes) == Some(4) {
         remarks.push("CMYK JPEG image: its colours are approximate".to_owned());
     }
     if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
         remarks.push("image with high dynamic range: cut at 1 and kept in 8 bits".to_owned());
     }
-    let rgba = image::DynamicImage::from_decoder(decoder)
-        .map_err(|error| describe(&error))?
-        .into_rgba8();
+    let rgba = image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
     let (width, height) = rgba.dimensions();
     let (texels, rest) = rgba.as_raw().as_chunks::<4>();
     if rest.is_empty() && texels.len() as u64 == u64::from(width) * u64::from(height) {
-        Ok(Texels {
-            width,
-            height,
-            texels: texels.to_vec(),
-        })
+        Ok(Texels { width, height, texels: texels.to_vec() })
     } else {
         Err("image has the wrong number of texels".to_owned())
     }
@@ -180,19 +137,12 @@ fn foreign_format(bytes: &[u8]) -> Option<&'static str> {
         (b"DDS ", "DDS"),
         (b"sB", "Basis Universal"),
     ];
-    MAGIC
-        .iter()
-        .find(|(magic, _)| bytes.starts_with(magic))
-        .map(|&(_, name)| name)
+    MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, name)| name)
 }
 
 /// Whether the end-of-image marker is there.
 fn has_jpeg_end(bytes: &[u8]) -> bool {
-    bytes
-        .windows(2)
-        .rev()
-        .take(1 << 16)
-        .any(|pair| pair == [0xff, 0xd9])
+    bytes.windows(2).rev().take(1 << 16).any(|pair| pair == [0xff, 0xd9])
 }
 
 /// Colour components according to the frame header.

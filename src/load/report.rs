@@ -32,12 +32,7 @@ pub(super) struct Sink<'w> {
 
 impl<'w> Sink<'w> {
     pub(super) fn new(world: &'w mut World) -> Self {
-        Self {
-            world,
-            report: LoadReport::default(),
-            spawned: Vec::new(),
-            unsaid: 0,
-        }
+        Self { world, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
     }
 
     /// Spawns, so that [`Sink::undo`] can take it back.
@@ -83,9 +78,7 @@ impl<'w> Sink<'w> {
     /// The finished report.
     pub(super) fn finish(mut self) -> LoadReport {
         if self.unsaid > 0 {
-            self.report
-                .warnings
-                .push(format!("... and {} more warnings", self.unsaid));
+            self.report.warnings.push(format!("... and {} more warnings", self.unsaid));
         }
         self.report
     }

@@ -52,19 +52,15 @@ impl Folder {
                     read_file(&any_case(folder, &relative)?, limit)
                 }
             }
-            Self::BuiltIn => builtin::asset(&relative.to_string_lossy())
-                .map(Cow::Borrowed)
-                .ok_or(ReadError::Missing),
+            Self::BuiltIn => {
+                builtin::asset(&relative.to_string_lossy()).map(Cow::Borrowed).ok_or(ReadError::Missing)
+            }
         }
     }
 
     /// As [`Folder::read`]; a path that is absolute, elsewhere or missing is tried once more by its
     /// bare file name, because exporters write the paths of the machine they ran on.
-    pub(super) fn read_or_neighbour(
-        &self,
-        reference: &str,
-        limit: u64,
-    ) -> Result<Bytes, ReadError> {
+    pub(super) fn read_or_neighbour(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
         let first = match self.read(reference, limit) {
             Err(why @ (ReadError::Missing | ReadError::Outside | ReadError::Scheme(_))) => why,
             done => return done,
@@ -88,22 +84,13 @@ pub(super) fn read_file(path: &Path, limit: u64) -> Result<Bytes, ReadError> {
     }
     let mut bytes = Vec::new();
     let capacity = usize::try_from(length).unwrap_or(usize::MAX);
-    bytes
-        .try_reserve_exact(capacity)
-        .map_err(|_| std::io::Error::from(std::io::ErrorKind::OutOfMemory))?;
-    fs::File::open(path)
-        .map_err(from_io)?
-        .take(limit)
-        .read_to_end(&mut bytes)?;
+    bytes.try_reserve_exact(capacity).map_err(|_| std::io::Error::from(std::io::ErrorKind::OutOfMemory))?;
+    fs::File::open(path).map_err(from_io)?.take(limit).read_to_end(&mut bytes)?;
     Ok(Cow::Owned(bytes))
 }
 
 fn from_io(error: std::io::Error) -> ReadError {
-    if error.kind() == std::io::ErrorKind::NotFound {
-        ReadError::Missing
-    } else {
-        ReadError::Io(error)
-    }
+    if error.kind() == std::io::ErrorKind::NotFound { ReadError::Missing } else { ReadError::Io(error) }
 }
 
 /// `http` of `http://...`; a single letter is a Windows drive, not a scheme.
@@ -111,9 +98,7 @@ pub(super) fn uri_scheme(reference: &str) -> Option<&str> {
     let (scheme, _) = reference.split_once(':')?;
     let legal = scheme.len() >= 2
         && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
-        && scheme
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
     legal.then_some(scheme)
 }
 

@@ -45,10 +45,7 @@ impl Transform {
         let forward = (target - eye).try_normalize().unwrap_or(DVec3::NEG_Z);
         let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
         let up = right.cross(forward);
-        Self(DAffine3 {
-            matrix3: glam::DMat3::from_cols(right, up, -forward),
-            translation: eye,
-        })
+        Self(DAffine3 { matrix3: glam::DMat3::from_cols(right, up, -forward), translation: eye })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Meshes and instances → the two levels of the hierarchy.
 
-use super::{Redone, RenderOrigin, MaterialNumbers};
+use super::{MaterialNumbers, Redone, RenderOrigin};
 use crate::bvh::{Blas, Placement, Tlas};
 use crate::scene::{GlobalTransform, Instance, Mesh};
 use crate::trace::Geometry;
@@ -100,4 +100,3 @@ pub fn sync_geometry(
     *geometry = Geometry { tlas: Tlas::build(placements), instances: data };
     redone.tlas += 1;
 }
-

@@ -90,25 +90,38 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
         }
         Light::Disk { radius, radiance, two_sided } => {
             let scale = vector(Vec3::X).length();
-            solid(Shape::Disk { center: position, normal: axis()?, radius: radius * scale }, [radiance; 4], two_sided)
+            solid(
+                Shape::Disk { center: position, normal: axis()?, radius: radius * scale },
+                [radiance; 4],
+                two_sided,
+            )
         }
         Light::Sphere { radius, radiance } => {
             let scale = Vec3::AXES.map(|a| vector(a).length()).iter().sum::<f32>() / 3.0;
             solid(Shape::Sphere { center: position, radius: radius * scale }, [radiance; 4], true)
         }
-        Light::Environment { radiance } => (radiance != Vec3::ZERO).then_some(FlatLight::Environment { radiance }),
+        Light::Environment { radiance } => {
+            (radiance != Vec3::ZERO).then_some(FlatLight::Environment { radiance })
+        }
     }
 }
 
 /// The emissive slots of an instance, each as a light.
-fn mesh_lights(instance: u32, data: &InstanceData, placed: &DAffine3, surfaces: &Surfaces) -> Vec<(u16, MeshLight)> {
+fn mesh_lights(
+    instance: u32,
+    data: &InstanceData,
+    placed: &DAffine3,
+    surfaces: &Surfaces,
+) -> Vec<(u16, MeshLight)> {
     let surface = |slot: u16| {
         let number = data.materials.get(usize::from(slot)).copied().unwrap_or(0);
         &surfaces.materials[number as usize].material
     };
     let slots = 0..data.materials.len().max(1) as u16;
     let emissive = slots.filter(|&slot| surface(slot).emission != Vec3::ZERO);
-    emissive.filter_map(|slot| Some((slot, mesh_light(instance, &data.mesh, slot, placed, surface(slot))?))).collect()
+    emissive
+        .filter_map(|slot| Some((slot, mesh_light(instance, &data.mesh, slot, placed, surface(slot))?)))
+        .collect()
 }
 
 fn mesh_light(
@@ -119,7 +132,8 @@ fn mesh_light(
     material: &Material,
 ) -> Option<MeshLight> {
     let mirrored = placed.matrix3.determinant() < 0.0;
-    let mut light = MeshLight { instance, two_sided: material.double_sided, mirrored, ..MeshLight::default() };
+    let mut light =
+        MeshLight { instance, two_sided: material.double_sided, mirrored, ..MeshLight::default() };
     let mut areas = Vec::new();
     for triangle in 0..mesh.triangles.len() {
         if mesh.slot(triangle) != usize::from(slot) {
@@ -147,4 +161,3 @@ fn mesh_light(
     light.power = std::f32::consts::PI * sides * luminance(material.emission) * total as f32;
     Some(light)
 }
-

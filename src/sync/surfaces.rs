@@ -92,4 +92,3 @@ fn renumber(numbers: &mut HashMap<Entity, u32>, mut present: Vec<Entity>, first:
         }
     }
 }
-

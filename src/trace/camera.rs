@@ -31,7 +31,9 @@ impl Viewpoint {
     pub fn new(render_from_camera: &DAffine3, projection: Projection) -> Self {
         let DMat3 { x_axis, y_axis, z_axis } = render_from_camera.matrix3;
         let back = z_axis.try_normalize().unwrap_or(DVec3::Z);
-        let up = (y_axis - back * back.dot(y_axis)).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+        let up = (y_axis - back * back.dot(y_axis))
+            .try_normalize()
+            .unwrap_or_else(|| back.any_orthonormal_vector());
         // A mirrored pose mirrors the picture.
         let right = up.cross(back) * if up.cross(back).dot(x_axis) < 0.0 { -1.0 } else { 1.0 };
         Self {

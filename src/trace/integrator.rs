@@ -71,7 +71,14 @@ const ROULETTE_DEPTH: u32 = 4;
 
 impl Batch {
     /// Adds samples `first..first + count` to each pixel of `tile`, for a picture of `size`.
-    pub fn render(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2, count: u32, rays: &mut RayCounts) {
+    pub fn render(
+        &mut self,
+        scene: &TraceScene,
+        tile: &mut Tile,
+        size: UVec2,
+        count: u32,
+        rays: &mut RayCounts,
+    ) {
         let first = tile.next_sample;
         self.paths.clear();
         self.keys.clear();
@@ -83,7 +90,15 @@ impl Batch {
                 let entry = self.keys.len() as u32;
                 self.keys.push((i, sample));
                 let throughput = Vec3::ONE;
-                self.paths.push(Path { entry, sampler, ray, throughput, depth: 0, bounce: None, last: false });
+                self.paths.push(Path {
+                    entry,
+                    sampler,
+                    ray,
+                    throughput,
+                    depth: 0,
+                    bounce: None,
+                    last: false,
+                });
             }
         }
         self.radiance.clear();
@@ -202,7 +217,9 @@ impl Batch {
             return;
         }
         let choice = path.sampler.pair(base + LOBE);
-        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), followed) else { return };
+        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), followed) else {
+            return;
+        };
         let mut throughput = path.throughput * sample.weight;
         if path.depth >= ROULETTE_DEPTH {
             let survival = throughput.max_element().clamp(0.05, 1.0);
@@ -223,7 +240,10 @@ impl Batch {
         });
     }
 
-    #[expect(clippy::too_many_arguments, reason = "all of one vertex; a struct for one call would only rename them")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all of one vertex; a struct for one call would only rename them"
+    )]
     fn connect(
         &mut self,
         scene: &TraceScene,

@@ -162,7 +162,8 @@ impl FlatLight {
                 let (wi, distance2) = direction(point, *position)?;
                 let ramp = (axis.dot(-wi) - cos_outer) / (cos_inner - cos_outer).max(1e-6);
                 let share = ramp.clamp(0.0, 1.0).powi(2);
-                (share > 0.0).then(|| LightSample::new(wi, Some(*position), *intensity * (share / distance2), None))
+                (share > 0.0)
+                    .then(|| LightSample::new(wi, Some(*position), *intensity * (share / distance2), None))
             }
             Self::Directional { axis, irradiance, sin2_radius } => {
                 if *sin2_radius == 0.0 {
@@ -388,7 +389,11 @@ impl MeshLight {
         let normal = cross.try_normalize()? * if self.mirrored { -1.0 } else { 1.0 };
         let area = 0.5 * cross.length() / share;
         let sample = sample_flat(point, position, normal, area, self.two_sided, Vec3::ONE)?;
-        Some(LightSample { triangle: Some((self.instance, self.triangles[i])), uv: Vec2::new(b1, b2), ..sample })
+        Some(LightSample {
+            triangle: Some((self.instance, self.triangles[i])),
+            uv: Vec2::new(b1, b2),
+            ..sample
+        })
     }
 
     /// Density in solid angle of sampling `triangle` at this distance and cosine at the light.

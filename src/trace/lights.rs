@@ -50,12 +50,15 @@ impl Lights {
     pub fn new(lights: Vec<FlatLight>, mut meshes: Vec<((u32, u16), u32)>, scene_radius: f32) -> Self {
         meshes.sort_unstable();
         // A power beyond f32 counts as its largest number, and their sum as what it is.
-        let powers: Vec<f64> = lights.iter().map(|l| f64::from(l.power(scene_radius).clamp(0.0, f32::MAX))).collect();
+        let powers: Vec<f64> =
+            lights.iter().map(|l| f64::from(l.power(scene_radius).clamp(0.0, f32::MAX))).collect();
         let total: f64 = powers.iter().sum();
         // Half by power, half evenly: a faint near light must not be forgotten.
         let even = 1.0 / lights.len().max(1) as f32;
-        let chances: Vec<f32> =
-            powers.iter().map(|p| if total > 0.0 { 0.5 * (p / total) as f32 + 0.5 * even } else { even }).collect();
+        let chances: Vec<f32> = powers
+            .iter()
+            .map(|p| if total > 0.0 { 0.5 * (p / total) as f32 + 0.5 * even } else { even })
+            .collect();
         let mut sum = 0.0;
         let cumulative = chances
             .iter()

@@ -46,7 +46,8 @@ impl Interaction {
 
         // The next ray starts from the rounded point, and rounds again on its way into local space.
         let m = world_from_local.matrix3;
-        let spread = m.x_axis.abs() * local.x.abs() + m.y_axis.abs() * local.y.abs() + m.z_axis.abs() * local.z.abs();
+        let spread =
+            m.x_axis.abs() * local.x.abs() + m.y_axis.abs() * local.y.abs() + m.z_axis.abs() * local.z.abs();
         let error = (position.abs() + spread) * (2.0 * UNIT);
 
         // The inverse transpose keeps sides, also under a mirroring placement.

@@ -89,7 +89,10 @@ mod tests {
     fn nearest_takes_the_texel_it_falls_into() {
         let texture = black_white(Encoding::Srgb, Wrap::Repeat);
         let at = |u| lookup(&texture, Filter::Nearest, Vec2::new(u, 0.0)).x;
-        assert_eq!([at(0.0), at(0.49), at(0.5), at(0.99), at(1.0), at(-0.01)], [0.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+        assert_eq!(
+            [at(0.0), at(0.49), at(0.5), at(0.99), at(1.0), at(-0.01)],
+            [0.0, 0.0, 1.0, 1.0, 0.0, 1.0]
+        );
     }
 
     #[test]

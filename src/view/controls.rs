@@ -160,14 +160,7 @@ mod tests {
 
     #[test]
     fn three_thirds_are_a_stop() {
-        let world = run(
-            &[
-                (Tap::Brighter, false),
-                (Tap::Brighter, false),
-                (Tap::Brighter, false),
-            ],
-            None,
-        );
+        let world = run(&[(Tap::Brighter, false), (Tap::Brighter, false), (Tap::Brighter, false)], None);
         assert_eq!(world.resource::<Display>().exposure, 1.0);
         let world = run(&[(Tap::Darker, true), (Tap::Brighter, false)], None);
         assert_eq!(world.resource::<Display>().exposure, -2.0 / 3.0);
@@ -175,14 +168,7 @@ mod tests {
 
     #[test]
     fn exposure_and_tone_map_do_not_touch_the_settings_that_reset_the_film() {
-        let world = run(
-            &[
-                (Tap::Brighter, true),
-                (Tap::ToneMap, false),
-                (Tap::Pause, false),
-            ],
-            None,
-        );
+        let world = run(&[(Tap::Brighter, true), (Tap::ToneMap, false), (Tap::Pause, false)], None);
         assert!(world.is_resource_changed::<Display>());
         assert!(!world.is_resource_changed::<RenderSettings>());
     }
@@ -191,10 +177,7 @@ mod tests {
     fn restart_marks_the_settings_although_they_stay_the_same() {
         let world = run(&[(Tap::Restart, false)], None);
         assert!(world.is_resource_changed::<RenderSettings>());
-        assert_eq!(
-            *world.resource::<RenderSettings>(),
-            RenderSettings::default()
-        );
+        assert_eq!(*world.resource::<RenderSettings>(), RenderSettings::default());
     }
 
     #[test]

@@ -1,11 +1,7 @@
 //! The thread that owns the [`App`] and runs its frames, so that the window never waits for a ray.
 
-use super::controls::{
-    Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera,
-};
-use super::fly::{
-    FileCameras, FlySpeed, change_speed, choose_camera, fly_camera, look_around, take_off,
-};
+use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
+use super::fly::{FileCameras, FlySpeed, change_speed, choose_camera, fly_camera, look_around, take_off};
 use super::hud::Status;
 use super::input::{Command, Input};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
@@ -24,8 +20,7 @@ use std::time::{Duration, Instant};
 /// Refinement per frame while the view changes: none, the next preview is worth more than some tiles.
 const MOVING: Duration = Duration::ZERO;
 /// Refinement per frame at rest. Commands interrupt it, so it costs no latency.
-const RESTING: std::ops::RangeInclusive<Duration> =
-    Duration::from_millis(30)..=Duration::from_millis(100);
+const RESTING: std::ops::RangeInclusive<Duration> = Duration::from_millis(30)..=Duration::from_millis(100);
 /// The longer the view rests, the rarer the pictures: this share of the time since it changed.
 const RESTING_SHARE: f64 = 0.1;
 
@@ -119,9 +114,9 @@ impl<W: Fn(Wake)> Engine<W> {
             app.world.resource_mut::<FrameBudget>().time = Some(match (paused, moving) {
                 (true, _) => Duration::ZERO,
                 (false, true) => MOVING,
-                (false, false) => (now - view_changed_at)
-                    .mul_f64(RESTING_SHARE)
-                    .clamp(*RESTING.start(), *RESTING.end()),
+                (false, false) => {
+                    (now - view_changed_at).mul_f64(RESTING_SHARE).clamp(*RESTING.start(), *RESTING.end())
+                }
             });
 
             let resets = app.world.resource::<Redone>().resets;
@@ -148,10 +143,7 @@ impl<W: Fn(Wake)> Engine<W> {
         let mut published = lock(&self.published);
         let has_picture = picture.version != old_version;
         if has_picture {
-            let mut copy = published
-                .picture
-                .take()
-                .unwrap_or_else(|| std::mem::take(&mut published.spare));
+            let mut copy = published.picture.take().unwrap_or_else(|| std::mem::take(&mut published.spare));
             // The copy is made without the lock, for the window may want to draw.
             drop(published);
             copy.rgba.clone_from(&picture.rgba);
@@ -195,20 +187,13 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     let propagated = app.world.run_system_once(propagate_transforms);
     debug_assert!(propagated.is_ok());
     let camera = app.world.resource::<ActiveCamera>().0;
-    app.world.insert_resource(FileCameras {
-        home: camera,
-        last: camera,
-    });
+    app.world.insert_resource(FileCameras { home: camera, last: camera });
     app.world.insert_resource(Input::new(Instant::now()));
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
     if !app.world.contains_resource::<FlySpeed>() {
-        let radius = app
-            .world
-            .get_resource::<SceneBounds>()
-            .map_or(2.0, |bounds| bounds.radius);
-        app.world
-            .insert_resource(FlySpeed(RADII_PER_SECOND * radius));
+        let radius = app.world.get_resource::<SceneBounds>().map_or(2.0, |bounds| bounds.radius);
+        app.world.insert_resource(FlySpeed(RADII_PER_SECOND * radius));
     }
     app.add_systems(
         (

@@ -26,12 +26,7 @@ pub struct FlyCamera {
 
 impl Default for FlyCamera {
     fn default() -> Self {
-        Self {
-            turn_speed: 1.2,
-            mouse_turn: 0.0025,
-            fast: 4.0,
-            slow: 0.25,
-        }
+        Self { turn_speed: 1.2, mouse_turn: 0.0025, fast: 4.0, slow: 0.25 }
     }
 }
 
@@ -69,10 +64,7 @@ impl FlyCameraState {
         } else {
             -forward.y.signum() * world_from_camera.y_axis
         };
-        Self {
-            yaw: (-heading.x).atan2(-heading.z),
-            pitch,
-        }
+        Self { yaw: (-heading.x).atan2(-heading.z), pitch }
     }
 
     /// The orientation, without roll.
@@ -85,10 +77,7 @@ impl FlyCameraState {
     #[must_use]
     pub fn turned(self, angles: DVec2) -> Self {
         let yaw = (self.yaw - angles.x).rem_euclid(std::f64::consts::TAU);
-        Self {
-            yaw,
-            pitch: (self.pitch - angles.y).clamp(-FRAC_PI_2, FRAC_PI_2),
-        }
+        Self { yaw, pitch: (self.pitch - angles.y).clamp(-FRAC_PI_2, FRAC_PI_2) }
     }
 }
 
@@ -104,14 +93,10 @@ pub fn choose_camera(
     if steps != 0 {
         let mut cameras: Vec<Entity> = cameras.iter().collect();
         cameras.sort_by_key(|camera| camera.index_u32());
-        let here = cameras
-            .iter()
-            .position(|&c| c == seen.last)
-            .map_or(if steps > 0 { -1 } else { 0 }, |i| i as i64);
+        let here =
+            cameras.iter().position(|&c| c == seen.last).map_or(if steps > 0 { -1 } else { 0 }, |i| i as i64);
         let there = (here + steps).checked_rem_euclid(cameras.len() as i64);
-        camera = there
-            .and_then(|there| cameras.get(there as usize).copied())
-            .or(camera);
+        camera = there.and_then(|there| cameras.get(there as usize).copied()).or(camera);
     }
     if let Some(camera) = camera {
         seen.last = camera;
@@ -143,14 +128,9 @@ pub fn take_off(
 }
 
 /// Turns the free camera.
-pub fn look_around(
-    input: Res<Input>,
-    mut cameras: Query<(&FlyCamera, &mut FlyCameraState, &mut Transform)>,
-) {
-    let keys = DVec2::new(
-        input.axis(Hold::LookRight, Hold::LookLeft),
-        input.axis(Hold::LookDown, Hold::LookUp),
-    );
+pub fn look_around(input: Res<Input>, mut cameras: Query<(&FlyCamera, &mut FlyCameraState, &mut Transform)>) {
+    let keys =
+        DVec2::new(input.axis(Hold::LookRight, Hold::LookLeft), input.axis(Hold::LookDown, Hold::LookUp));
     for (settings, mut state, mut transform) in &mut cameras {
         let angles = keys * settings.turn_speed + input.look * settings.mouse_turn;
         // The roll of a file's camera is kept until the user looks around.
@@ -163,29 +143,16 @@ pub fn look_around(
 }
 
 /// Moves the free camera: along its line of sight and to its sides, up and down along the world's axis.
-pub fn fly_camera(
-    input: Res<Input>,
-    speed: Res<FlySpeed>,
-    mut cameras: Query<(&FlyCamera, &mut Transform)>,
-) {
+pub fn fly_camera(input: Res<Input>, speed: Res<FlySpeed>, mut cameras: Query<(&FlyCamera, &mut Transform)>) {
     let right = input.axis(Hold::Right, Hold::Left);
     let up = input.axis(Hold::Up, Hold::Down);
     let back = input.axis(Hold::Back, Hold::Forward);
     for (settings, mut transform) in &mut cameras {
         let axes = transform.0.matrix3;
-        let seconds = axes.x_axis.normalize_or_zero() * right
-            + DVec3::Y * up
-            + axes.z_axis.normalize_or_zero() * back;
-        let fast = if input.is_held(Hold::Fast) {
-            settings.fast
-        } else {
-            1.0
-        };
-        let slow = if input.is_held(Hold::Slow) {
-            settings.slow
-        } else {
-            1.0
-        };
+        let seconds =
+            axes.x_axis.normalize_or_zero() * right + DVec3::Y * up + axes.z_axis.normalize_or_zero() * back;
+        let fast = if input.is_held(Hold::Fast) { settings.fast } else { 1.0 };
+        let slow = if input.is_held(Hold::Slow) { settings.slow } else { 1.0 };
         let mut moved = *transform;
         moved.0.translation += seconds * speed.0 * fast * slow;
         transform.set_if_neq(moved);
@@ -216,10 +183,7 @@ pub fn camera_flags(camera: Camera, pose: GlobalTransform) -> String {
             if degrees.to_radians() == vertical_fov {
                 format!("{flags} --camera-view-angle {degrees}")
             } else {
-                format!(
-                    "{flags} --camera-view-angle {}",
-                    f64::from(vertical_fov).to_degrees()
-                )
+                format!("{flags} --camera-view-angle {}", f64::from(vertical_fov).to_degrees())
             }
         }
         Projection::Orthographic { .. } => flags,
@@ -241,24 +205,10 @@ mod tests {
 
     fn world() -> (World, Schedule) {
         let mut world = World::new();
-        let pose = Transform::looking_at(
-            DVec3::new(1.0, 2.0, 3.0),
-            DVec3::new(0.0, 2.0, -5.0),
-            DVec3::Y,
-        );
-        let camera = world
-            .spawn((
-                Camera::default(),
-                pose,
-                GlobalTransform(pose.0),
-                Name::new("a"),
-            ))
-            .id();
+        let pose = Transform::looking_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 2.0, -5.0), DVec3::Y);
+        let camera = world.spawn((Camera::default(), pose, GlobalTransform(pose.0), Name::new("a"))).id();
         world.insert_resource(ActiveCamera(camera));
-        world.insert_resource(FileCameras {
-            home: camera,
-            last: camera,
-        });
+        world.insert_resource(FileCameras { home: camera, last: camera });
         world.insert_resource(FlySpeed(2.0));
         let mut schedule = Schedule::default();
         schedule.add_systems(
@@ -288,10 +238,7 @@ mod tests {
         let (mut world, mut schedule) = world();
         let start = Instant::now();
         let mut input = Input::new(start);
-        input.apply(&Command::Held {
-            held: down(keys),
-            at: start,
-        });
+        input.apply(&Command::Held { held: down(keys), at: start });
         world.insert_resource(input);
         let mut now = start;
         while now < start + duration {
@@ -306,36 +253,21 @@ mod tests {
     #[test]
     fn motion_does_not_depend_on_the_frame_rate() {
         let second = Duration::from_secs(1);
-        for keys in [
-            &[Hold::Forward][..],
-            &[Hold::Left, Hold::Up, Hold::Fast],
-            &[Hold::LookLeft, Hold::LookUp],
-        ] {
+        for keys in
+            [&[Hold::Forward][..], &[Hold::Left, Hold::Up, Hold::Fast], &[Hold::LookLeft, Hold::LookUp]]
+        {
             let coarse = fly(keys, second, Duration::from_millis(100));
             let fine = fly(keys, second, Duration::from_millis(1));
-            assert!(
-                coarse.0.abs_diff_eq(fine.0, 1e-9),
-                "{keys:?}: {coarse:?} {fine:?}"
-            );
+            assert!(coarse.0.abs_diff_eq(fine.0, 1e-9), "{keys:?}: {coarse:?} {fine:?}");
         }
     }
 
     #[test]
     fn forward_goes_where_the_camera_looks_at_the_base_speed() {
-        let pose = fly(
-            &[Hold::Forward],
-            Duration::from_secs(1),
-            Duration::from_millis(50),
-        );
+        let pose = fly(&[Hold::Forward], Duration::from_secs(1), Duration::from_millis(50));
         let direction = DVec3::new(-1.0, 0.0, -8.0).normalize();
-        assert!(
-            (pose.0.translation - (DVec3::new(1.0, 2.0, 3.0) + 2.0 * direction)).length() < 1e-9
-        );
-        let up = fly(
-            &[Hold::Up, Hold::Slow],
-            Duration::from_secs(1),
-            Duration::from_millis(50),
-        );
+        assert!((pose.0.translation - (DVec3::new(1.0, 2.0, 3.0) + 2.0 * direction)).length() < 1e-9);
+        let up = fly(&[Hold::Up, Hold::Slow], Duration::from_secs(1), Duration::from_millis(50));
         assert!((up.0.translation - DVec3::new(1.0, 2.5, 3.0)).length() < 1e-9);
     }
 
@@ -344,31 +276,23 @@ mod tests {
         let (mut world, mut schedule) = world();
         let start = Instant::now();
         let mut input = Input::new(start);
-        input.apply(&Command::Held {
-            held: down(&[Hold::Forward]),
-            at: start,
-        });
+        input.apply(&Command::Held { held: down(&[Hold::Forward]), at: start });
         world.insert_resource(input);
         let mut frame = |world: &mut World, ms: u64| {
             world.clear_trackers();
-            world
-                .resource_mut::<Input>()
-                .hold_until(start + Duration::from_millis(ms));
+            world.resource_mut::<Input>().hold_until(start + Duration::from_millis(ms));
             schedule.run(world);
             let mut changed =
                 world.query_filtered::<(), Or<(Changed<Transform>, Changed<GlobalTransform>)>>();
             let any = changed.iter(world).next().is_some();
-            let resources = world.is_resource_changed::<ActiveCamera>()
-                || world.is_resource_changed::<FlySpeed>();
+            let resources =
+                world.is_resource_changed::<ActiveCamera>() || world.is_resource_changed::<FlySpeed>();
             world.resource_mut::<Input>().end_frame();
             any || resources
         };
         assert!(frame(&mut world, 20));
         let input = &mut *world.resource_mut::<Input>();
-        input.apply(&Command::Held {
-            held: down(&[]),
-            at: start + Duration::from_millis(20),
-        });
+        input.apply(&Command::Held { held: down(&[]), at: start + Duration::from_millis(20) });
         for ms in [40, 60, 80] {
             assert!(!frame(&mut world, ms), "changed at {ms} ms");
         }
@@ -386,10 +310,7 @@ mod tests {
         assert_ne!(world.resource::<ActiveCamera>().0, home);
         assert_eq!(*world.get::<Transform>(home).unwrap(), pose);
         world.resource_mut::<Input>().end_frame();
-        world
-            .resource_mut::<Input>()
-            .taps
-            .push((Tap::ResetCamera, false));
+        world.resource_mut::<Input>().taps.push((Tap::ResetCamera, false));
         schedule.run(&mut world);
         assert_eq!(world.resource::<ActiveCamera>().0, home);
     }
@@ -423,11 +344,7 @@ mod tests {
 
     #[test]
     fn flags_are_exact_and_short_where_the_numbers_are() {
-        let pose = Transform::looking_at(
-            DVec3::new(0.1, -2.0, 3.0),
-            DVec3::new(0.1, -2.0, 0.0),
-            DVec3::Y,
-        );
+        let pose = Transform::looking_at(DVec3::new(0.1, -2.0, 3.0), DVec3::new(0.1, -2.0, 0.0), DVec3::Y);
         assert_eq!(
             camera_flags(Camera::default(), GlobalTransform(pose.0)),
             "--camera-position 0.1,-2,3 --camera-focal-point 0.1,-2,2 --camera-view-up 0,1,0 --camera-view-angle 45"

@@ -89,10 +89,7 @@ pub fn status_lines(level: Level, status: &Status, measured: Measured) -> Vec<St
     if level == Level::None {
         return Vec::new();
     }
-    let noise = status.noise.map_or_else(
-        || "-".to_owned(),
-        |n| format!("{} %", significant(n * 100.0)),
-    );
+    let noise = status.noise.map_or_else(|| "-".to_owned(), |n| format!("{} %", significant(n * 100.0)));
     let mut first = format!(
         "{} / {} spp   noise {noise}   {} pictures/s   {} Mrays/s",
         samples(status.samples_per_pixel),
@@ -108,19 +105,14 @@ pub fn status_lines(level: Level, status: &Status, measured: Measured) -> Vec<St
     } else if status.done {
         first += "   done";
     }
-    let second = format!(
-        "exposure {:+.2} EV   speed {}/s   H: help",
-        status.exposure,
-        significant(status.speed)
-    );
+    let second =
+        format!("exposure {:+.2} EV   speed {}/s   H: help", status.exposure, significant(status.speed));
     let mut lines = vec![first, second];
     if status.dropped > 0 {
         lines.push(format!("{} samples dropped: not finite", status.dropped));
     }
     if level == Level::Long {
-        let latency = measured
-            .latency
-            .map_or_else(|| "-".to_owned(), |s| significant(s * 1e3));
+        let latency = measured.latency.map_or_else(|| "-".to_owned(), |s| significant(s * 1e3));
         lines.push(format!(
             "{} x {}   {} light   tone map {}   textures {}",
             status.size.x,
@@ -129,10 +121,7 @@ pub fn status_lines(level: Level, status: &Status, measured: Measured) -> Vec<St
             tone_map_name(status.tone_map),
             filter_name(status.filter),
         ));
-        lines.push(format!(
-            "key to picture {latency} ms   restarts {}",
-            status.resets
-        ));
+        lines.push(format!("key to picture {latency} ms   restarts {}", status.resets));
     }
     lines
 }
@@ -152,11 +141,7 @@ fn significant(x: f64) -> String {
 
 /// Whole samples as such, and a digit of what is between.
 fn samples(samples: f64) -> String {
-    if samples.fract() == 0.0 {
-        format!("{samples}")
-    } else {
-        format!("{samples:.1}")
-    }
+    if samples.fract() == 0.0 { format!("{samples}") } else { format!("{samples:.1}") }
 }
 
 /// How many screen pixels a dot of the font is wide and high.
@@ -191,11 +176,7 @@ impl<'a> Canvas<'a> {
     #[must_use]
     pub fn new(rgba: &'a mut [u8], size: UVec2, scale: u32) -> Self {
         debug_assert_eq!(rgba.len(), size.element_product() as usize * 4);
-        Self {
-            rgba,
-            size,
-            scale: scale.max(1),
-        }
+        Self { rgba, size, scale: scale.max(1) }
     }
 
     fn dots(&self) -> UVec2 {
@@ -207,10 +188,7 @@ impl<'a> Canvas<'a> {
         let (min, max) = (min * self.scale, (max * self.scale).min(self.size));
         for y in min.y..max.y {
             let row = (y * self.size.x) as usize * 4;
-            let (from, to) = (
-                row + min.x as usize * 4,
-                row + max.x.max(min.x) as usize * 4,
-            );
+            let (from, to) = (row + min.x as usize * 4, row + max.x.max(min.x) as usize * 4);
             for pixel in self.rgba[from..to].chunks_exact_mut(4) {
                 pixel[..3].iter_mut().for_each(|c| *c /= darkness);
             }
@@ -236,11 +214,7 @@ impl<'a> Canvas<'a> {
             Place::Bottom => UVec2::new(MARGIN, (room.y + MARGIN).saturating_sub(block.y)),
             Place::Middle => room.saturating_sub(block) / 2 + MARGIN,
         };
-        self.plate(
-            origin.saturating_sub(UVec2::splat(MARGIN)),
-            origin + block + MARGIN,
-            darkness,
-        );
+        self.plate(origin.saturating_sub(UVec2::splat(MARGIN)), origin + block + MARGIN, darkness);
         let style = MonoTextStyle::new(font, BinaryColor::On);
         for (line, y) in lines.iter().zip((origin.y..).step_by(glyph.y as usize)) {
             let at = Point::new(origin.x as i32, y as i32);
@@ -266,13 +240,9 @@ impl<'a> Canvas<'a> {
 }
 
 fn help_lines() -> Vec<String> {
-    let width = keymap::help()
-        .map(|(keys, _)| keys.len())
-        .max()
-        .unwrap_or(0);
-    let mut lines: Vec<String> = keymap::help()
-        .map(|(keys, text)| format!("{keys:width$}   {text}"))
-        .collect();
+    let width = keymap::help().map(|(keys, _)| keys.len()).max().unwrap_or(0);
+    let mut lines: Vec<String> =
+        keymap::help().map(|(keys, text)| format!("{keys:width$}   {text}")).collect();
     lines.push(format!("{:width$}   * restarts the accumulation", ""));
     lines
 }
@@ -282,10 +252,7 @@ fn wrap(line: &str, columns: usize) -> Vec<String> {
     let mut rest: Vec<char> = line.chars().collect();
     let mut pieces = Vec::new();
     while rest.len() > columns {
-        let space = rest[..=columns]
-            .iter()
-            .rposition(|&c| c == ' ')
-            .filter(|&at| at > 0);
+        let space = rest[..=columns].iter().rposition(|&c| c == ' ').filter(|&at| at > 0);
         let tail = rest.split_off(space.unwrap_or(columns));
         pieces.push(rest.iter().collect::<String>().trim_end().to_owned());
         rest = tail.into_iter().skip_while(|&c| c == ' ').collect();
@@ -304,10 +271,7 @@ impl DrawTarget for Canvas<'_> {
     type Color = BinaryColor;
     type Error = Infallible;
 
-    fn draw_iter<I: IntoIterator<Item = Pixel<BinaryColor>>>(
-        &mut self,
-        pixels: I,
-    ) -> Result<(), Infallible> {
+    fn draw_iter<I: IntoIterator<Item = Pixel<BinaryColor>>>(&mut self, pixels: I) -> Result<(), Infallible> {
         let dots = self.dots();
         for Pixel(at, color) in pixels {
             let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y)) else {
@@ -352,18 +316,10 @@ mod tests {
     #[test]
     fn unknown_noise_is_not_zero_noise() {
         let lines = status_lines(Level::Short, &status(), Measured::default());
-        assert_eq!(
-            lines[0],
-            "2.8 / 64 spp   noise -   0 pictures/s   1.23 Mrays/s   preview 1/4"
-        );
+        assert_eq!(lines[0], "2.8 / 64 spp   noise -   0 pictures/s   1.23 Mrays/s   preview 1/4");
         assert_eq!(lines[1], "exposure +0.33 EV   speed 0.500/s   H: help");
-        let known = Status {
-            noise: Some(0.012_34),
-            ..status()
-        };
-        assert!(
-            status_lines(Level::Short, &known, Measured::default())[0].contains("noise 1.23 %")
-        );
+        let known = Status { noise: Some(0.012_34), ..status() };
+        assert!(status_lines(Level::Short, &known, Measured::default())[0].contains("noise 1.23 %"));
     }
 
     #[test]
@@ -387,15 +343,8 @@ mod tests {
         let size = UVec2::new(200, 40);
         let mut rgba = vec![255; size.element_product() as usize * 4];
         Canvas::new(&mut rgba, size, 1).write(Place::Top, &["spp".to_owned()]);
-        let dark = rgba
-            .chunks_exact(4)
-            .filter(|p| p[0] < 80 && p[3] == 255)
-            .count();
-        let white = rgba
-            .chunks_exact(4)
-            .take(32 * 200)
-            .filter(|p| p[0] == 255)
-            .count();
+        let dark = rgba.chunks_exact(4).filter(|p| p[0] < 80 && p[3] == 255).count();
+        let white = rgba.chunks_exact(4).take(32 * 200).filter(|p| p[0] == 255).count();
         assert!(dark > 300, "{dark}");
         assert!(white > 30, "{white}");
     }

@@ -78,10 +78,7 @@ impl Input {
     pub fn apply(&mut self, command: &Command) -> Option<Instant> {
         match *command {
             Command::Held { held, at } => {
-                let pressed = held
-                    .iter()
-                    .zip(self.held)
-                    .any(|(&now, before)| now && !before);
+                let pressed = held.iter().zip(self.held).any(|(&now, before)| now && !before);
                 self.hold_until(at);
                 self.held = held;
                 (pressed && self.is_moving()).then_some(at)
@@ -96,11 +93,7 @@ impl Input {
             }
             Command::Tap { tap, shift, at } => {
                 self.taps.push((tap, shift));
-                matches!(
-                    tap,
-                    Tap::ResetCamera | Tap::PreviousCamera | Tap::NextCamera
-                )
-                .then_some(at)
+                matches!(tap, Tap::ResetCamera | Tap::PreviousCamera | Tap::NextCamera).then_some(at)
             }
             Command::Resize(size) => {
                 self.resize = Some(size);
@@ -116,12 +109,7 @@ impl Input {
     /// not depend on when frames happen.
     pub fn hold_until(&mut self, now: Instant) {
         let step = now.saturating_duration_since(self.since).as_secs_f64();
-        for (seconds, _) in self
-            .seconds
-            .iter_mut()
-            .zip(self.held)
-            .filter(|(_, held)| *held)
-        {
+        for (seconds, _) in self.seconds.iter_mut().zip(self.held).filter(|(_, held)| *held) {
             *seconds = (*seconds + step).min(LONGEST_STEP);
         }
         self.since = self.since.max(now);
@@ -189,20 +177,8 @@ mod tests {
         let start = Instant::now();
         let at = |ms| start + Duration::from_millis(ms);
         let mut input = Input::new(start);
-        assert_eq!(
-            input.apply(&Command::Held {
-                held: only(Hold::Forward),
-                at: at(500)
-            }),
-            Some(at(500))
-        );
-        assert_eq!(
-            input.apply(&Command::Held {
-                held: [false; Hold::COUNT],
-                at: at(520)
-            }),
-            None
-        );
+        assert_eq!(input.apply(&Command::Held { held: only(Hold::Forward), at: at(500) }), Some(at(500)));
+        assert_eq!(input.apply(&Command::Held { held: [false; Hold::COUNT], at: at(520) }), None);
         input.hold_until(at(700));
         assert!((input.seconds(Hold::Forward) - 0.020).abs() < 1e-9);
         assert!(!input.is_moving());
@@ -214,10 +190,7 @@ mod tests {
     fn a_hitch_moves_by_a_tenth_of_a_second_at_most() {
         let start = Instant::now();
         let mut input = Input::new(start);
-        input.apply(&Command::Held {
-            held: only(Hold::Back),
-            at: start,
-        });
+        input.apply(&Command::Held { held: only(Hold::Back), at: start });
         input.hold_until(start + Duration::from_secs(5));
         assert_eq!(input.seconds(Hold::Back), LONGEST_STEP);
     }

@@ -109,151 +109,61 @@ pub struct Binding {
     pub text: &'static str,
 }
 
-const fn hold(
-    codes: &'static [KeyCode],
-    hold: Hold,
-    keys: &'static str,
-    text: &'static str,
-) -> Binding {
-    Binding {
-        codes,
-        control: false,
-        action: Action::Hold(hold),
-        repeats: false,
-        keys,
-        text,
-    }
+const fn hold(codes: &'static [KeyCode], hold: Hold, keys: &'static str, text: &'static str) -> Binding {
+    Binding { codes, control: false, action: Action::Hold(hold), repeats: false, keys, text }
 }
 
-const fn tap(
-    codes: &'static [KeyCode],
-    tap: Tap,
-    keys: &'static str,
-    text: &'static str,
-) -> Binding {
-    Binding {
-        codes,
-        control: false,
-        action: Action::Tap(tap),
-        repeats: false,
-        keys,
-        text,
-    }
+const fn tap(codes: &'static [KeyCode], tap: Tap, keys: &'static str, text: &'static str) -> Binding {
+    Binding { codes, control: false, action: Action::Tap(tap), repeats: false, keys, text }
 }
 
 const fn again(binding: Binding) -> Binding {
-    Binding {
-        repeats: true,
-        ..binding
-    }
+    Binding { repeats: true, ..binding }
 }
 
 const fn with_control(binding: Binding) -> Binding {
-    Binding {
-        control: true,
-        ..binding
-    }
+    Binding { control: true, ..binding }
 }
 
 use KeyCode::{
     AltLeft, AltRight, ArrowDown, ArrowLeft, ArrowRight, ArrowUp, BracketLeft, BracketRight, Comma,
-    ControlLeft, ControlRight, Enter, Equal, Escape, F11, F12, KeyA, KeyC, KeyD, KeyE, KeyH, KeyI,
-    KeyN, KeyQ, KeyR, KeyS, KeyT, KeyW, KeyZ, Minus, NumpadAdd, NumpadEnter, NumpadSubtract,
-    PageDown, PageUp, Period, ShiftLeft, ShiftRight, Slash, Space,
+    ControlLeft, ControlRight, Enter, Equal, Escape, F11, F12, KeyA, KeyC, KeyD, KeyE, KeyH, KeyI, KeyN,
+    KeyQ, KeyR, KeyS, KeyT, KeyW, KeyZ, Minus, NumpadAdd, NumpadEnter, NumpadSubtract, PageDown, PageUp,
+    Period, ShiftLeft, ShiftRight, Slash, Space,
 };
 
 /// All keys, in the order of the help. `*` in a text marks what restarts the accumulation.
 pub const KEYMAP: &[Binding] = &[
-    hold(
-        &[KeyW],
-        Hold::Forward,
-        "W A S D",
-        "move forward, left, back, right *",
-    ),
+    hold(&[KeyW], Hold::Forward, "W A S D", "move forward, left, back, right *"),
     hold(&[KeyA], Hold::Left, "", ""),
     hold(&[KeyS], Hold::Back, "", ""),
     hold(&[KeyD], Hold::Right, "", ""),
-    hold(
-        &[KeyE, PageUp],
-        Hold::Up,
-        "E / Q",
-        "move up / down (also PageUp / PageDown) *",
-    ),
+    hold(&[KeyE, PageUp], Hold::Up, "E / Q", "move up / down (also PageUp / PageDown) *"),
     hold(&[KeyQ, PageDown], Hold::Down, "", ""),
-    hold(
-        &[ShiftLeft, ShiftRight],
-        Hold::Fast,
-        "Shift / Alt",
-        "hold: 4 times faster / slower",
-    ),
+    hold(&[ShiftLeft, ShiftRight], Hold::Fast, "Shift / Alt", "hold: 4 times faster / slower"),
     hold(&[AltLeft, AltRight], Hold::Slow, "", ""),
     hold(&[ControlLeft, ControlRight], Hold::Control, "", ""),
-    again(tap(
-        &[Equal, NumpadAdd],
-        Tap::Faster,
-        "+ / - / wheel",
-        "base speed",
-    )),
+    again(tap(&[Equal, NumpadAdd], Tap::Faster, "+ / - / wheel", "base speed")),
     again(tap(&[Minus, NumpadSubtract], Tap::Slower, "", "")),
-    hold(
-        &[ArrowLeft],
-        Hold::LookLeft,
-        "arrows",
-        "look (or drag with the right mouse button) *",
-    ),
+    hold(&[ArrowLeft], Hold::LookLeft, "arrows", "look (or drag with the right mouse button) *"),
     hold(&[ArrowRight], Hold::LookRight, "", ""),
     hold(&[ArrowUp], Hold::LookUp, "", ""),
     hold(&[ArrowDown], Hold::LookDown, "", ""),
-    tap(
-        &[Enter, NumpadEnter],
-        Tap::ResetCamera,
-        "Enter",
-        "back to the first camera *",
-    ),
-    tap(
-        &[BracketLeft],
-        Tap::PreviousCamera,
-        "[ / ]",
-        "previous / next camera of the file *",
-    ),
+    tap(&[Enter, NumpadEnter], Tap::ResetCamera, "Enter", "back to the first camera *"),
+    tap(&[BracketLeft], Tap::PreviousCamera, "[ / ]", "previous / next camera of the file *"),
     tap(&[BracketRight], Tap::NextCamera, "", ""),
-    tap(
-        &[KeyC],
-        Tap::PrintCamera,
-        "C",
-        "print the camera as command line flags",
-    ),
+    tap(&[KeyC], Tap::PrintCamera, "C", "print the camera as command line flags"),
     tap(&[Space], Tap::Pause, "Space", "pause / resume"),
     tap(&[KeyR], Tap::Restart, "R", "restart the accumulation *"),
-    again(tap(
-        &[Comma],
-        Tap::Darker,
-        ", / .",
-        "exposure -/+ 1/3 EV (with Shift 1 EV)",
-    )),
+    again(tap(&[Comma], Tap::Darker, ", / .", "exposure -/+ 1/3 EV (with Shift 1 EV)")),
     again(tap(&[Period], Tap::Brighter, "", "")),
     tap(&[KeyT], Tap::ToneMap, "T", "tone map: clip, neutral"),
-    tap(
-        &[KeyN],
-        Tap::Filter,
-        "N",
-        "texture filter: file's, nearest, bilinear *",
-    ),
+    tap(&[KeyN], Tap::Filter, "N", "texture filter: file's, nearest, bilinear *"),
     tap(&[KeyI], Tap::Integrator, "I", "integrator: direct, path *"),
-    tap(
-        &[KeyZ],
-        Tap::HudLevel,
-        "Z",
-        "status lines: none, short, long",
-    ),
+    tap(&[KeyZ], Tap::HudLevel, "Z", "status lines: none, short, long"),
     tap(&[KeyH, Slash], Tap::Help, "H or ?", "this help"),
     tap(&[F11], Tap::FullScreen, "F11", "full screen"),
-    tap(
-        &[F12],
-        Tap::ScreenshotWithHud,
-        "F12",
-        "save a screenshot (with Ctrl: without text)",
-    ),
+    tap(&[F12], Tap::ScreenshotWithHud, "F12", "save a screenshot (with Ctrl: without text)"),
     with_control(tap(&[F12], Tap::Screenshot, "", "")),
     tap(&[Escape], Tap::Escape, "Esc", "close the help"),
     with_control(tap(&[KeyQ], Tap::Quit, "Ctrl+Q", "quit")),
@@ -264,26 +174,18 @@ pub const KEYMAP: &[Binding] = &[
 /// Shift, Alt and Control themselves mean the same with and without Control.
 #[must_use]
 pub fn lookup(code: KeyCode, control: bool) -> Option<&'static Binding> {
-    KEYMAP
-        .iter()
-        .find(|b| b.codes.contains(&code) && (b.control == control || is_modifier(b.action)))
+    KEYMAP.iter().find(|b| b.codes.contains(&code) && (b.control == control || is_modifier(b.action)))
 }
 
 /// Whether `action` only modifies others.
 #[must_use]
 pub fn is_modifier(action: Action) -> bool {
-    matches!(
-        action,
-        Action::Hold(Hold::Fast | Hold::Slow | Hold::Control)
-    )
+    matches!(action, Action::Hold(Hold::Fast | Hold::Slow | Hold::Control))
 }
 
 /// The rows of the help: keys and what they do.
 pub fn help() -> impl Iterator<Item = (&'static str, &'static str)> {
-    KEYMAP
-        .iter()
-        .filter(|b| !b.keys.is_empty())
-        .map(|b| (b.keys, b.text))
+    KEYMAP.iter().filter(|b| !b.keys.is_empty()).map(|b| (b.keys, b.text))
 }
 
 #[cfg(test)]
@@ -295,10 +197,7 @@ mod tests {
         let mut seen: Vec<(KeyCode, bool)> = Vec::new();
         for binding in KEYMAP {
             for &code in binding.codes {
-                assert!(
-                    !seen.contains(&(code, binding.control)),
-                    "{code:?} is bound twice"
-                );
+                assert!(!seen.contains(&(code, binding.control)), "{code:?} is bound twice");
                 seen.push((code, binding.control));
             }
         }
@@ -308,28 +207,17 @@ mod tests {
     fn every_row_is_described_by_itself_or_by_a_row_above() {
         assert!(!KEYMAP[0].keys.is_empty());
         for binding in KEYMAP {
-            assert_eq!(
-                binding.keys.is_empty(),
-                binding.text.is_empty(),
-                "{:?}",
-                binding.action
-            );
+            assert_eq!(binding.keys.is_empty(), binding.text.is_empty(), "{:?}", binding.action);
         }
         assert!(help().count() > 15);
     }
 
     #[test]
     fn control_changes_the_meaning_of_a_letter_but_not_of_shift() {
-        assert_eq!(
-            lookup(KeyQ, false).unwrap().action,
-            Action::Hold(Hold::Down)
-        );
+        assert_eq!(lookup(KeyQ, false).unwrap().action, Action::Hold(Hold::Down));
         assert_eq!(lookup(KeyQ, true).unwrap().action, Action::Tap(Tap::Quit));
         assert!(lookup(KeyW, true).is_none(), "Ctrl+W must not fly");
-        assert_eq!(
-            lookup(ShiftLeft, true).unwrap().action,
-            Action::Hold(Hold::Fast)
-        );
+        assert_eq!(lookup(ShiftLeft, true).unwrap().action, Action::Hold(Hold::Fast));
     }
 
     #[test]

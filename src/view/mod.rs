@@ -81,10 +81,7 @@ fn event_loop() -> Result<EventLoop<Wake>, String> {
 
 /// Without the source file and line that winit begins its messages with.
 fn without_place(message: &str) -> &str {
-    match message
-        .strip_prefix("os error at ")
-        .and_then(|rest| rest.split_once(": "))
-    {
+    match message.strip_prefix("os error at ").and_then(|rest| rest.split_once(": ")) {
         Some((_, what)) => what,
         None => message,
     }
@@ -111,10 +108,7 @@ fn prefer_what_is_there(builder: &mut EventLoopBuilder<Wake>) -> Result<(), Stri
         };
     };
     // `join` keeps an absolute name as it is.
-    let socket = set("XDG_RUNTIME_DIR")
-        .map(PathBuf::from)
-        .unwrap_or_default()
-        .join(name);
+    let socket = set("XDG_RUNTIME_DIR").map(PathBuf::from).unwrap_or_default().join(name);
     if x11.is_some() && UnixStream::connect(&socket).is_err() {
         builder.with_x11();
     }
@@ -132,10 +126,7 @@ mod tests {
 
     #[test]
     fn messages_tell_what_is_wrong_and_not_where_in_the_source() {
-        assert_eq!(
-            without_place("os error at /a/b.rs:7: no display: :9"),
-            "no display: :9"
-        );
+        assert_eq!(without_place("os error at /a/b.rs:7: no display: :9"), "no display: :9");
         assert_eq!(
             without_place("the requested operation is not supported"),
             "the requested operation is not supported"

@@ -46,9 +46,8 @@ impl Screen {
             .with_title(title)
             .with_inner_size(PhysicalSize::new(size.x.max(1), size.y.max(1)));
         #[cfg(target_os = "linux")]
-        let attributes = winit::platform::x11::WindowAttributesExtX11::with_name(
-            attributes, "penumbra", "penumbra",
-        );
+        let attributes =
+            winit::platform::x11::WindowAttributesExtX11::with_name(attributes, "penumbra", "penumbra");
         let window = event_loop
             .create_window(attributes)
             .map_err(|e| format!("cannot open a window: {}", without_place(&e.to_string())))?;
@@ -59,28 +58,16 @@ impl Screen {
         let pixels = quietly(|| Pixels::new(size.x, size.y, surface))
             .map_err(|panic| format!("no graphics adapter: {panic}"))?
             .map_err(|e| {
-                format!(
-                    "no graphics adapter (Vulkan or GL) can draw into the window: {}",
-                    with_sources(&e)
-                )
+                format!("no graphics adapter (Vulkan or GL) can draw into the window: {}", with_sources(&e))
             })?;
         let device_error = Arc::new(Mutex::new(None));
         let seen = Arc::clone(&device_error);
         // wgpu's own handler panics, for instance when another program destroys the window.
-        pixels
-            .device()
-            .on_uncaptured_error(Arc::new(move |error: pixels::wgpu::Error| {
-                lock(&seen).get_or_insert_with(|| error.to_string());
-            }));
+        pixels.device().on_uncaptured_error(Arc::new(move |error: pixels::wgpu::Error| {
+            lock(&seen).get_or_insert_with(|| error.to_string());
+        }));
         let software = pixels.adapter().get_info().device_type == DeviceType::Cpu;
-        Ok(Self {
-            pixels,
-            window,
-            software,
-            size,
-            failures: 0,
-            device_error,
-        })
+        Ok(Self { pixels, window, software, size, failures: 0, device_error })
     }
 
     /// Width and height of the picture on it, physical pixels, at least 1.
@@ -117,11 +104,7 @@ impl Screen {
             (Ok(()), Some(error)) if self.failures > 2 * PATIENCE => Presented::Lost(error),
             (Ok(()) | Err(Error::Surface(_)), _) => {
                 self.failures += 1;
-                Presented::Later(Duration::from_millis(if self.failures > PATIENCE {
-                    50
-                } else {
-                    4
-                }))
+                Presented::Later(Duration::from_millis(if self.failures > PATIENCE { 50 } else { 4 }))
             }
             (Err(error), _) => Presented::Lost(with_sources(&error)),
         }
@@ -134,11 +117,7 @@ impl Screen {
 
     /// Full screen or window.
     pub fn toggle_full_screen(&self) {
-        let full = self
-            .window
-            .fullscreen()
-            .is_none()
-            .then_some(Fullscreen::Borderless(None));
+        let full = self.window.fullscreen().is_none().then_some(Fullscreen::Borderless(None));
         self.window.set_fullscreen(full);
     }
 }
@@ -181,9 +160,6 @@ mod tests {
     #[test]
     fn a_quiet_panic_is_its_message() {
         assert_eq!(quietly(|| 3), Ok(3));
-        assert_eq!(
-            quietly(|| -> u8 { panic!("no {}", "library") }),
-            Err("no library".to_owned())
-        );
+        assert_eq!(quietly(|| -> u8 { panic!("no {}", "library") }), Err("no library".to_owned()));
     }
 }

@@ -13,10 +13,7 @@ use std::path::{Path, PathBuf};
 /// What went wrong, with the path.
 pub fn save(rgba: &[u8], size: UVec2, directory: &Path, stem: &str) -> Result<PathBuf, String> {
     // A stem is a name, not a way to another directory.
-    let stem: String = stem
-        .chars()
-        .map(|c| if std::path::is_separator(c) { '_' } else { c })
-        .collect();
+    let stem: String = stem.chars().map(|c| if std::path::is_separator(c) { '_' } else { c }).collect();
     for n in 1_u32.. {
         let path = directory.join(format!("{stem}_{n}.png"));
         // `create_new` looks and creates in one: two programs cannot get the same number.
@@ -30,17 +27,11 @@ pub fn save(rgba: &[u8], size: UVec2, directory: &Path, stem: &str) -> Result<Pa
             Err(error) => return Err(format!("{}: {error}", path.display())),
         }
     }
-    Err(format!(
-        "{}: no number is left for {stem}",
-        directory.display()
-    ))
+    Err(format!("{}: no number is left for {stem}", directory.display()))
 }
 
 fn write_png(file: File, rgba: &[u8], size: UVec2) -> Result<(), String> {
-    let rgb: Vec<u8> = rgba
-        .chunks_exact(4)
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .collect();
+    let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let mut file = BufWriter::new(file);
     PngEncoder::new(&mut file)
         .write_image(&rgb, size.x, size.y, ExtendedColorType::Rgb8)
@@ -74,8 +65,7 @@ mod tests {
 
     #[test]
     fn numbers_go_up_and_nothing_is_overwritten() {
-        let directory =
-            std::env::temp_dir().join(format!("penumbra-screenshot-{}", std::process::id()));
+        let directory = std::env::temp_dir().join(format!("penumbra-screenshot-{}", std::process::id()));
         std::fs::create_dir_all(&directory).unwrap();
         let rgba = [10, 20, 30, 255, 40, 50, 60, 255];
         let size = UVec2::new(2, 1);
@@ -85,11 +75,7 @@ mod tests {
         let read = image::open(&first).unwrap().to_rgb8();
         assert_eq!(read.into_raw(), [10, 20, 30, 40, 50, 60]);
         std::fs::remove_dir_all(&directory).unwrap();
-        assert!(
-            save(&rgba, size, &directory, "a")
-                .unwrap_err()
-                .contains("a_1.png")
-        );
+        assert!(save(&rgba, size, &directory, "a").unwrap_err().contains("a_1.png"));
     }
 
     #[test]

@@ -85,10 +85,7 @@ struct Due {
 
 impl Due {
     fn next(self) -> Option<Instant> {
-        [self.redraw, self.resize, self.notice, self.exit]
-            .into_iter()
-            .flatten()
-            .min()
+        [self.redraw, self.resize, self.notice, self.exit].into_iter().flatten().min()
     }
 }
 
@@ -178,20 +175,13 @@ impl Viewer {
             // The event loop is gone: so is who would look.
             wake: move |wake| drop(proxy.send_event(wake)),
         };
-        let thread = std::thread::Builder::new()
-            .name("engine".to_owned())
-            .spawn(move || {
-                let _alive: Sender<Infallible> = alive;
-                engine.run(open);
-            });
+        let thread = std::thread::Builder::new().name("engine".to_owned()).spawn(move || {
+            let _alive: Sender<Infallible> = alive;
+            engine.run(open);
+        });
         match thread {
             Ok(_) => {
-                self.engine = Some(Link {
-                    commands,
-                    interrupt,
-                    published,
-                    ended,
-                });
+                self.engine = Some(Link { commands, interrupt, published, ended });
             }
             Err(error) => drop(self.proxy.send_event(Wake::Crashed(error.to_string()))),
         }
@@ -220,14 +210,10 @@ impl Viewer {
     /// Presents at once, or later if nobody misses it and it costs CPU time.
     fn redraw_in_time(&mut self) {
         let Some(screen) = &self.screen else { return };
-        let at_rest = screen.software
-            && !self.moving
-            && self.status.as_ref().is_some_and(|s| !s.done && !s.paused);
+        let at_rest =
+            screen.software && !self.moving && self.status.as_ref().is_some_and(|s| !s.done && !s.paused);
         let last = self.presented.back().copied();
-        match last
-            .map(|last| last + SOFTWARE_PACE)
-            .filter(|&next| at_rest && next > Instant::now())
-        {
+        match last.map(|last| last + SOFTWARE_PACE).filter(|&next| at_rest && next > Instant::now()) {
             Some(next) => {
                 self.due.redraw.get_or_insert(next);
             }
@@ -262,15 +248,11 @@ impl Viewer {
             Some(status) => status_lines(self.level, status, measured),
             None => Vec::new(),
         };
-        let loading = self
-            .status
-            .is_none()
-            .then(|| [format!("loading {} ...", self.options.screenshot_stem)]);
+        let loading =
+            self.status.is_none().then(|| [format!("loading {} ...", self.options.screenshot_stem)]);
         let outcome = screen.draw(|bytes, size| {
             if self.picture.rgba.is_empty() {
-                bytes
-                    .chunks_exact_mut(4)
-                    .for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
+                bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
             } else {
                 screenshot::scale_into(&self.picture.rgba, self.picture.size, bytes, size);
             }
@@ -306,12 +288,9 @@ impl Viewer {
             None => format!("{} - loading", self.options.title),
             Some(s) if s.done => format!("{} - done", self.options.title),
             Some(s) if s.paused => format!("{} - paused", self.options.title),
-            Some(s) => format!(
-                "{} - {:.0} of {}",
-                self.options.title,
-                s.samples_per_pixel.floor(),
-                s.sample_target
-            ),
+            Some(s) => {
+                format!("{} - {:.0} of {}", self.options.title, s.samples_per_pixel.floor(), s.sample_target)
+            }
         };
         let is_final = self.status.as_ref().is_none_or(|s| s.done || s.paused);
         let long_ago = self.titled_at.is_none_or(|at| now - at > TITLE_PACE);
@@ -327,10 +306,7 @@ impl Viewer {
 
     fn measured(&mut self) -> Measured {
         let now = Instant::now();
-        while self
-            .presented
-            .front()
-            .is_some_and(|&at| now - at > Duration::from_secs(1))
+        while self.presented.front().is_some_and(|&at| now - at > Duration::from_secs(1))
             && self.presented.len() > 1
         {
             self.presented.pop_front();
@@ -344,10 +320,7 @@ impl Viewer {
         let mut sorted: Vec<Duration> = self.latencies.iter().copied().collect();
         sorted.sort_unstable();
         let latency = sorted.get(sorted.len() / 2).map(Duration::as_secs_f64);
-        Measured {
-            pictures_per_second,
-            latency,
-        }
+        Measured { pictures_per_second, latency }
     }
 
     fn resized(&mut self, size: UVec2) {
@@ -403,10 +376,7 @@ impl Viewer {
         }
         if held != self.held {
             self.held = held;
-            self.send(Command::Held {
-                held,
-                at: Instant::now(),
-            });
+            self.send(Command::Held { held, at: Instant::now() });
         }
     }
 
@@ -426,11 +396,7 @@ impl Viewer {
             }
             tap => {
                 let shift = self.held[Hold::Fast as usize];
-                return self.send(Command::Tap {
-                    tap,
-                    shift,
-                    at: Instant::now(),
-                });
+                return self.send(Command::Tap { tap, shift, at: Instant::now() });
             }
         }
         self.redraw();
@@ -488,9 +454,7 @@ impl Viewer {
         let off = (DVec2::new(to.x, to.y) - middle).abs();
         if off.cmpgt(middle / 2.0).any() {
             // Where the pointer is locked there is nothing to put back.
-            let _ = screen
-                .window
-                .set_cursor_position(PhysicalPosition::new(middle.x, middle.y));
+            let _ = screen.window.set_cursor_position(PhysicalPosition::new(middle.x, middle.y));
         }
     }
 
@@ -527,10 +491,7 @@ impl ApplicationHandler<Wake> for Viewer {
             }
             Wake::Notice(text) => self.say(text),
             Wake::OpenFailed(why) => self.fail(event_loop, ViewError::Scene(why)),
-            Wake::Crashed(why) => self.fail(
-                event_loop,
-                ViewError::Lost(format!("internal error: {why}")),
-            ),
+            Wake::Crashed(why) => self.fail(event_loop, ViewError::Lost(format!("internal error: {why}"))),
         }
     }
 
@@ -540,10 +501,7 @@ impl ApplicationHandler<Wake> for Viewer {
             WindowEvent::Destroyed => {
                 // Nothing may be asked of the window any more.
                 self.screen = None;
-                self.fail(
-                    event_loop,
-                    ViewError::Lost("something destroyed the window".to_owned()),
-                );
+                self.fail(event_loop, ViewError::Lost("something destroyed the window".to_owned()));
             }
             WindowEvent::RedrawRequested => self.draw(event_loop),
             WindowEvent::Resized(size) => self.resized(vector(size)),
@@ -552,16 +510,10 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.redraw();
             }
             WindowEvent::Focused(false) => self.leave(),
-            WindowEvent::KeyboardInput {
-                event,
-                is_synthetic,
-                ..
-            } => self.key(event_loop, &event, is_synthetic),
-            WindowEvent::MouseInput {
-                state,
-                button: MouseButton::Right,
-                ..
-            } => {
+            WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
+                self.key(event_loop, &event, is_synthetic)
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Right, .. } => {
                 self.set_drag(state == ElementState::Pressed);
             }
             WindowEvent::CursorMoved { position, .. } => self.cursor_moved(position),
@@ -577,10 +529,7 @@ impl ApplicationHandler<Wake> for Viewer {
         if let DeviceEvent::MouseMotion { delta: (x, y) } = event
             && self.drag.is_some()
         {
-            self.send(Command::Look {
-                pixels: DVec2::new(x, y),
-                at: Instant::now(),
-            });
+            self.send(Command::Look { pixels: DVec2::new(x, y), at: Instant::now() });
         }
     }
 
@@ -601,10 +550,6 @@ impl ApplicationHandler<Wake> for Viewer {
         if is_due(&mut self.due.exit, now) {
             event_loop.exit();
         }
-        event_loop.set_control_flow(
-            self.due
-                .next()
-                .map_or(ControlFlow::Wait, ControlFlow::WaitUntil),
-        );
+        event_loop.set_control_flow(self.due.next().map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
     }
 }

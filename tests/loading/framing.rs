@@ -5,14 +5,8 @@ use super::*;
 /// Whether the active camera sees a point, in a square picture.
 fn sees(world: &World, point: DVec3) -> bool {
     let camera = world.resource::<ActiveCamera>().0;
-    let local = world
-        .get::<GlobalTransform>(camera)
-        .unwrap()
-        .0
-        .inverse()
-        .transform_point3(point);
-    let Projection::Perspective { vertical_fov } = world.get::<Camera>(camera).unwrap().projection
-    else {
+    let local = world.get::<GlobalTransform>(camera).unwrap().0.inverse().transform_point3(point);
+    let Projection::Perspective { vertical_fov } = world.get::<Camera>(camera).unwrap().projection else {
         return false;
     };
     let reach = f64::from(vertical_fov / 2.0).tan() * -local.z;
@@ -29,11 +23,7 @@ fn a_file_without_camera_and_light_gets_both_and_says_so() {
         assert!(sees(&world, DVec3::new(corner[0], corner[1], 0.0)));
     }
     // It faces +Z, so that is where the camera stands.
-    let eye = world
-        .get::<GlobalTransform>(world.resource::<ActiveCamera>().0)
-        .unwrap()
-        .0
-        .translation;
+    let eye = world.get::<GlobalTransform>(world.resource::<ActiveCamera>().0).unwrap().0.translation;
     assert!(eye.z > 0.5);
     let bounds = *world.resource::<SceneBounds>();
     assert!(
@@ -42,23 +32,12 @@ fn a_file_without_camera_and_light_gets_both_and_says_so() {
     );
     let key = named::<Light>(&mut world, "key light");
     let at = named::<GlobalTransform>(&mut world, "key light").0;
-    let Light::Parallelogram {
-        edge_u,
-        edge_v,
-        radiance,
-        ..
-    } = key
-    else {
-        panic!("{key:?}")
-    };
+    let Light::Parallelogram { edge_u, edge_v, radiance, .. } = key else { panic!("{key:?}") };
     let normal = at.transform_vector3(edge_u.cross(edge_v).as_dvec3());
     let to_center = bounds.center - at.translation;
-    assert!(
-        normal.normalize().dot(to_center.normalize()) > 0.999,
-        "shines elsewhere"
-    );
-    let white = f64::from(radiance[0].x) * normal.length()
-        / (std::f64::consts::PI * to_center.length_squared());
+    assert!(normal.normalize().dot(to_center.normalize()) > 0.999, "shines elsewhere");
+    let white =
+        f64::from(radiance[0].x) * normal.length() / (std::f64::consts::PI * to_center.length_squared());
     assert!((white - 0.8).abs() < 1e-4, "{white}");
 }
 
@@ -79,10 +58,7 @@ fn far_outliers_do_not_shrink_the_scene() {
 #[test]
 fn an_emissive_material_is_light_enough() {
     let text = format!("mtllib a.mtl\nusemtl e\n{QUAD}f 1 2 3\n");
-    let (mut world, _) = loaded_all(&[
-        ("a.obj", text.as_bytes()),
-        ("a.mtl", b"newmtl e\nKe 1 1 1\n"),
-    ]);
+    let (mut world, _) = loaded_all(&[("a.obj", text.as_bytes()), ("a.mtl", b"newmtl e\nKe 1 1 1\n")]);
     assert!(lights(&mut world).is_empty());
 }
 
@@ -91,9 +67,5 @@ fn an_empty_scene_still_has_a_camera() {
     let (world, report) = loaded("a.obj", "# nothing\n");
     assert_eq!(report.triangles, 0);
     assert_says(&report.warnings.join("\n"), "nothing to see");
-    assert!(
-        world
-            .get::<Camera>(world.resource::<ActiveCamera>().0)
-            .is_some()
-    );
+    assert!(world.get::<Camera>(world.resource::<ActiveCamera>().0).is_some());
 }

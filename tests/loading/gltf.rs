@@ -9,10 +9,7 @@ fn a_primitive_without_normals_or_indices_is_flat_and_light_grey() {
     let mesh = only_mesh(&mut world);
     assert!(mesh.normals.is_empty());
     assert_eq!(mesh.uvs[2], Vec2::new(0.0, 1.0));
-    assert_eq!(
-        named::<Material>(&mut world, "default"),
-        Material::default()
-    );
+    assert_eq!(named::<Material>(&mut world, "default"), Material::default());
     assert_says(&report.decisions.join("\n"), "light grey");
 }
 
@@ -21,15 +18,18 @@ fn strips_turn_every_other_triangle_and_fans_share_the_first_vertex() {
     // Indices 0 1 2 0 in a buffer of their own.
     let with_indices = |mode: u32| {
         gltf_triangle("", &format!(r#","mode":{mode},"indices":3"#), "")
-            .replace(r#""type":"VEC3"}],"#, r#""type":"VEC3"},{"bufferView":1,"componentType":5121,"count":4,"type":"SCALAR"}],"#)
-            .replace(r#"{"buffer":0,"byteLength":96}"#, r#"{"buffer":1,"byteLength":96},{"buffer":0,"byteLength":4}"#)
+            .replace(
+                r#""type":"VEC3"}],"#,
+                r#""type":"VEC3"},{"bufferView":1,"componentType":5121,"count":4,"type":"SCALAR"}],"#,
+            )
+            .replace(
+                r#"{"buffer":0,"byteLength":96}"#,
+                r#"{"buffer":1,"byteLength":96},{"buffer":0,"byteLength":4}"#,
+            )
             .replace(r#""buffers":["#, r#""buffers":[{"byteLength":4,"uri":"data:;base64,AAECAA=="},"#)
     };
     let (mut world, report) = loaded("a.gltf", &with_indices(5));
-    assert_eq!(
-        (report.triangles, only_mesh(&mut world).triangles),
-        (2, vec![[0, 1, 2], [1, 0, 2]])
-    );
+    assert_eq!((report.triangles, only_mesh(&mut world).triangles), (2, vec![[0, 1, 2], [1, 0, 2]]));
     let (mut world, report) = loaded("a.gltf", &with_indices(6));
     assert_eq!(
         (report.triangles, only_mesh(&mut world).triangles),
@@ -68,10 +68,7 @@ fn the_hierarchy_is_kept_and_composed_in_double_precision() {
 #[test]
 fn a_mesh_used_by_two_nodes_is_one_entity() {
     let text = gltf_triangle("", "", "")
-        .replace(
-            r#""nodes":[{"mesh":0}],"#,
-            r#""nodes":[{"mesh":0},{"mesh":0}],"#,
-        )
+        .replace(r#""nodes":[{"mesh":0}],"#, r#""nodes":[{"mesh":0},{"mesh":0}],"#)
         .replace(r#"{"nodes":[0]}"#, r#"{"nodes":[0,1]}"#);
     let (mut world, report) = loaded("a.gltf", &text);
     assert_eq!(
@@ -87,51 +84,27 @@ fn a_mesh_used_by_two_nodes_is_one_entity() {
 #[test]
 fn cycles_second_parents_and_lost_children_are_refused() {
     let with = |nodes: &str| {
-        gltf_triangle("", "", "").replace(
-            r#""nodes":[{"mesh":0}],"#,
-            &format!(r#""nodes":[{nodes}],"#),
-        )
+        gltf_triangle("", "", "").replace(r#""nodes":[{"mesh":0}],"#, &format!(r#""nodes":[{nodes}],"#))
     };
-    assert_says(
-        &refusal("a.gltf", &with(r#"{"children":[1]},{"children":[0]}"#)),
-        "cycle",
-    );
-    assert_says(
-        &refusal("a.gltf", &with(r#"{"children":[1,2]},{"children":[2]},{}"#)),
-        "two parents",
-    );
-    assert_says(
-        &refusal("a.gltf", &with(r#"{"children":[7]}"#)),
-        "child node 7 of 1",
-    );
+    assert_says(&refusal("a.gltf", &with(r#"{"children":[1]},{"children":[0]}"#)), "cycle");
+    assert_says(&refusal("a.gltf", &with(r#"{"children":[1,2]},{"children":[2]},{}"#)), "two parents");
+    assert_says(&refusal("a.gltf", &with(r#"{"children":[7]}"#)), "child node 7 of 1");
 }
 
 #[test]
 fn a_chain_of_a_hundred_thousand_nodes_needs_no_deep_stack() {
     let n = 100_000;
-    let chain: Vec<String> = (1..n)
-        .map(|i| format!(r#"{{"children":[{i}],"translation":[1,0,0]}}"#))
-        .collect();
-    let nodes = format!(
-        r#""nodes":[{},{{"name":"last","mesh":0}}],"#,
-        chain.join(",")
-    );
-    let (mut world, report) = loaded(
-        "a.gltf",
-        &gltf_triangle("", "", "").replace(r#""nodes":[{"mesh":0}],"#, &nodes),
-    );
+    let chain: Vec<String> =
+        (1..n).map(|i| format!(r#"{{"children":[{i}],"translation":[1,0,0]}}"#)).collect();
+    let nodes = format!(r#""nodes":[{},{{"name":"last","mesh":0}}],"#, chain.join(","));
+    let (mut world, report) =
+        loaded("a.gltf", &gltf_triangle("", "", "").replace(r#""nodes":[{"mesh":0}],"#, &nodes));
     assert_eq!(report.triangles, 1);
-    assert_eq!(
-        named::<GlobalTransform>(&mut world, "last").0.translation.x,
-        f64::from(n - 1)
-    );
+    assert_eq!(named::<GlobalTransform>(&mut world, "last").0.translation.x, f64::from(n - 1));
     // A refused file of that depth is taken back without recursion too.
     let broken = nodes.replace(r#""mesh":0"#, r#""mesh":5"#);
     assert_says(
-        &refusal(
-            "b.gltf",
-            &gltf_triangle("", "", "").replace(r#""nodes":[{"mesh":0}],"#, &broken),
-        ),
+        &refusal("b.gltf", &gltf_triangle("", "", "").replace(r#""nodes":[{"mesh":0}],"#, &broken)),
         "mesh 5 of 1",
     );
 }
@@ -145,18 +118,14 @@ fn materials_keep_their_factors_textures_and_samplers() {
         "emissiveFactor":[1,0.5,0],"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":10}}}],
         "textures":[{"source":0,"sampler":0}],"samplers":[{"magFilter":9728,"wrapS":33071,"wrapT":33648}],"images":[{"uri":"a%20b.png"}]"#;
     let text = gltf_triangle("", r#","material":0"#, more);
-    let (mut world, report) =
-        loaded_all(&[("a.gltf", text.as_bytes()), ("a b.png", &png([1, 2, 3, 4]))]);
+    let (mut world, report) = loaded_all(&[("a.gltf", text.as_bytes()), ("a b.png", &png([1, 2, 3, 4]))]);
     assert!(report.warnings.is_empty(), "{:?}", report.warnings);
     let material = named::<Material>(&mut world, "m");
     assert_eq!(
         (material.base_color, material.opacity, material.alpha),
         (Vec3::new(0.5, 0.25, 1.0), 0.5, Alpha::Mask(0.3))
     );
-    assert_eq!(
-        (material.emission, material.double_sided),
-        (Vec3::new(10.0, 5.0, 0.0), true)
-    );
+    assert_eq!((material.emission, material.double_sided), (Vec3::new(10.0, 5.0, 0.0), true));
     let base = material.base_color_texture.unwrap();
     // A quarter turn counter-clockwise with v down: u runs up.
     let moved = base.uv_transform.transform_point2(Vec2::new(0.25, 0.0));
@@ -167,20 +136,11 @@ fn materials_keep_their_factors_textures_and_samplers() {
         (Encoding::Srgb, Filter::Nearest, [Wrap::Clamp, Wrap::Mirror])
     );
     assert_eq!(texture.texels.texels, [[1, 2, 3, 4]]);
-    let Glossy::Ggx {
-        metallic,
-        roughness,
-        texture: Some(rough),
-    } = material.glossy
-    else {
+    let Glossy::Ggx { metallic, roughness, texture: Some(rough) } = material.glossy else {
         panic!("{:?}", material.glossy)
     };
     assert_eq!(
-        (
-            metallic,
-            roughness,
-            world.get::<Texture>(rough.texture).unwrap().encoding
-        ),
+        (metallic, roughness, world.get::<Texture>(rough.texture).unwrap().encoding),
         (0.75, 0.5, Encoding::Linear)
     );
 }
@@ -203,11 +163,7 @@ fn punctual_lights_are_photometric_and_keep_their_angles() {
     let (mut world, report) = loaded("a.gltf", &gltf_triangle(node, "", more));
     assert_eq!(
         lights(&mut world),
-        [Light::Spot {
-            intensity: Vec3::new(1.0, 0.5, 0.0),
-            inner_angle: 0.25,
-            outer_angle: 0.5
-        }]
+        [Light::Spot { intensity: Vec3::new(1.0, 0.5, 0.0), inner_angle: 0.25, outer_angle: 0.5 }]
     );
     assert_says(&report.decisions.join("\n"), "candela");
 }
@@ -220,11 +176,7 @@ fn cameras_are_listed_and_the_first_is_active() {
         .replace(r#""nodes":[{"mesh":0}],"#, nodes)
         .replace(r#"{"nodes":[0]}"#, r#"{"nodes":[0,1]}"#);
     let (world, report) = loaded("a.gltf", &text);
-    let names: Vec<&str> = report
-        .cameras
-        .iter()
-        .map(|(name, _)| name.as_str())
-        .collect();
+    let names: Vec<&str> = report.cameras.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["eye", "camera 1"]);
     assert_eq!(world.resource::<ActiveCamera>().0, report.cameras[0].1);
     assert_eq!(
@@ -239,13 +191,7 @@ fn cameras_are_listed_and_the_first_is_active() {
 
 #[test]
 fn extensions_are_named_when_required_and_warned_of_when_used() {
-    let with = |key: &str| {
-        gltf_triangle(
-            "",
-            "",
-            &format!(r#","{key}":["KHR_draco_mesh_compression"]"#),
-        )
-    };
+    let with = |key: &str| gltf_triangle("", "", &format!(r#","{key}":["KHR_draco_mesh_compression"]"#));
     let message = refusal("scene.gltf", &with("extensionsRequired"));
     assert_says(
         &message,
@@ -260,19 +206,8 @@ fn instances_of_an_extension_are_placed() {
     // Three translations: the positions of the triangle.
     let node = r#","extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":0}}}"#;
     let (mut world, report) = loaded("a.gltf", &gltf_triangle(node, "", ""));
-    assert_eq!(
-        (
-            report.triangles,
-            world.query::<&Instance>().iter(&world).count()
-        ),
-        (3, 3)
-    );
-    assert_eq!(
-        named::<GlobalTransform>(&mut world, "instance 1")
-            .0
-            .translation,
-        DVec3::X
-    );
+    assert_eq!((report.triangles, world.query::<&Instance>().iter(&world).count()), (3, 3));
+    assert_eq!(named::<GlobalTransform>(&mut world, "instance 1").0.translation, DVec3::X);
 }
 
 #[test]
@@ -281,39 +216,18 @@ fn damaged_accessors_and_containers_are_refused_with_their_place() {
     assert_says(
         &refusal(
             "a.gltf",
-            &good.replace(
-                r#""count":3,"type":"VEC2""#,
-                r#""count":4000000000,"type":"VEC2""#,
-            ),
+            &good.replace(r#""count":3,"type":"VEC2""#, r#""count":4000000000,"type":"VEC2""#),
         ),
         "accessor 1",
     );
     assert_says(
-        &refusal(
-            "a.gltf",
-            &good.replace(r#""byteLength":96}],"#, r#""byteLength":9600}],"#),
-        ),
+        &refusal("a.gltf", &good.replace(r#""byteLength":96}],"#, r#""byteLength":9600}],"#)),
         "buffer view 0",
     );
-    assert_says(
-        &refusal(
-            "a.gltf",
-            &good.replace(r#""POSITION":0"#, r#""POSITION":9"#),
-        ),
-        "accessor 9 of 3",
-    );
-    assert_says(
-        &refusal(
-            "a.gltf",
-            &good.replace(r#""version":"2.0""#, r#""version":"1.0""#),
-        ),
-        "version 1.0",
-    );
+    assert_says(&refusal("a.gltf", &good.replace(r#""POSITION":0"#, r#""POSITION":9"#)), "accessor 9 of 3");
+    assert_says(&refusal("a.gltf", &good.replace(r#""version":"2.0""#, r#""version":"1.0""#)), "version 1.0");
     assert_says(&refusal("a.gltf", &good[..good.len() / 2]), "JSON");
-    assert_says(
-        &refusal("a.glb", "glTF\u{2}\0\0\0\u{7f}\0\0\0"),
-        "truncated",
-    );
+    assert_says(&refusal("a.glb", "glTF\u{2}\0\0\0\u{7f}\0\0\0"), "truncated");
     assert_says(&refusal("a.glb", ""), "empty");
 }
 
@@ -336,9 +250,6 @@ fn a_skinned_mesh_stands_where_its_joints_are() {
         .replace(r#""buffers":["#, &format!(r#""buffers":[{{"byteLength":24,"uri":"data:;base64,{}"}},"#, base64(&data)));
     let (mut world, _) = loaded("a.gltf", &text);
     assert_eq!(only_mesh(&mut world).positions[0], Vec3::Y * 5.0);
-    let transform = world
-        .query_filtered::<&GlobalTransform, With<Instance>>()
-        .single(&world)
-        .unwrap();
+    let transform = world.query_filtered::<&GlobalTransform, With<Instance>>().single(&world).unwrap();
     assert_eq!(transform.0, DAffine3::IDENTITY);
 }

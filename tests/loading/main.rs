@@ -11,12 +11,11 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use penumbra::load::{
-    LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator,
-    built_in_scenes, load,
+    LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, built_in_scenes, load,
 };
 use penumbra::scene::{
-    ActiveCamera, Alpha, Camera, Encoding, Filter, GlobalTransform, Glossy, Instance, Light,
-    Material, Mesh, Projection, SceneBounds, Texture, TriangleMesh, Visible, Wrap,
+    ActiveCamera, Alpha, Camera, Encoding, Filter, GlobalTransform, Glossy, Instance, Light, Material, Mesh,
+    Projection, SceneBounds, Texture, TriangleMesh, Visible, Wrap,
 };
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -27,11 +26,7 @@ struct Folder(PathBuf);
 impl Folder {
     fn new(files: &[(&str, &[u8])]) -> Self {
         static NUMBER: AtomicUsize = AtomicUsize::new(0);
-        let name = format!(
-            "penumbra-{}-{}",
-            std::process::id(),
-            NUMBER.fetch_add(1, Ordering::Relaxed)
-        );
+        let name = format!("penumbra-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
         let folder = Self(std::env::temp_dir().join(name));
         std::fs::create_dir_all(&folder.0).unwrap();
         for (name, content) in files {
@@ -44,11 +39,7 @@ impl Folder {
         self.load_with(name, &LoadOptions::default())
     }
 
-    fn load_with(
-        &self,
-        name: &str,
-        options: &LoadOptions,
-    ) -> (World, Result<LoadReport, LoadError>) {
+    fn load_with(&self, name: &str, options: &LoadOptions) -> (World, Result<LoadReport, LoadError>) {
         let mut world = World::new();
         let result = load(&mut world, &SceneSource::File(self.0.join(name)), options);
         (world, result)
@@ -78,11 +69,7 @@ fn refusal(name: &str, content: &str) -> String {
     let message = result.expect_err("accepted").to_string();
     assert!(message.contains(name), "does not name the file: {message}");
     assert!(!message.contains('\n'), "more than one line: {message}");
-    assert_eq!(
-        world.query::<&Name>().iter(&world).count(),
-        0,
-        "left entities behind"
-    );
+    assert_eq!(world.query::<&Name>().iter(&world).count(), 0, "left entities behind");
     message
 }
 
@@ -97,10 +84,7 @@ fn only_mesh(world: &mut World) -> TriangleMesh {
 
 fn named<T: Component + Clone>(world: &mut World, name: &str) -> T {
     let mut query = world.query::<(&Name, &T)>();
-    let found = query
-        .iter(world)
-        .find(|(n, _)| n.as_str() == name)
-        .map(|(_, component)| component.clone());
+    let found = query.iter(world).find(|(n, _)| n.as_str() == name).map(|(_, component)| component.clone());
     found.unwrap_or_else(|| panic!("nothing called {name}"))
 }
 
@@ -110,19 +94,13 @@ fn lights(world: &mut World) -> Vec<Light> {
 
 fn base64(bytes: &[u8]) -> String {
     let digit = |bits: u32| {
-        char::from(
-            b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-                [(bits & 63) as usize],
-        )
+        char::from(b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"[(bits & 63) as usize])
     };
     let word = |chunk: &[u8]| {
         let [a, b, c] = [0, 1, 2].map(|i| u32::from(chunk.get(i).copied().unwrap_or(0)));
         let bits = a << 16 | b << 8 | c;
-        let digits: String = [18, 12, 6, 0]
-            .iter()
-            .take(chunk.len() + 1)
-            .map(|shift| digit(bits >> shift))
-            .collect();
+        let digits: String =
+            [18, 12, 6, 0].iter().take(chunk.len() + 1).map(|shift| digit(bits >> shift)).collect();
         format!("{digits:=<4}")
     };
     bytes.chunks(3).map(word).collect()
@@ -171,31 +149,15 @@ fn every_built_in_scene_loads_without_a_warning() {
         let source = SceneSource::parse(scene.name).unwrap();
         assert_eq!(source, SceneSource::BuiltIn(scene.name));
         let mut world = World::new();
-        let report = load(&mut world, &source, &LoadOptions::default())
-            .unwrap_or_else(|error| panic!("{error}"));
-        assert!(
-            report.warnings.is_empty(),
-            "{}: {:?}",
-            scene.name,
-            report.warnings
-        );
-        assert!(
-            report.triangles > 0 && !report.cameras.is_empty(),
-            "{}",
-            scene.name
-        );
+        let report =
+            load(&mut world, &source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert!(report.warnings.is_empty(), "{}: {:?}", scene.name, report.warnings);
+        assert!(report.triangles > 0 && !report.cameras.is_empty(), "{}", scene.name);
         let shines = world.query::<&Light>().iter(&world).count()
-            + world
-                .query::<&Material>()
-                .iter(&world)
-                .filter(|m| m.emission != Vec3::ZERO)
-                .count();
+            + world.query::<&Material>().iter(&world).filter(|m| m.emission != Vec3::ZERO).count();
         assert!(shines > 0, "{}: dark", scene.name);
         assert!(
-            !report
-                .decisions
-                .iter()
-                .any(|line| line.contains("no light") || line.contains("no camera")),
+            !report.decisions.iter().any(|line| line.contains("no light") || line.contains("no camera")),
             "{:?}",
             report.decisions
         );
@@ -205,12 +167,7 @@ fn every_built_in_scene_loads_without_a_warning() {
 #[test]
 fn the_bust_has_as_many_triangles_as_its_name_says() {
     let mut world = World::new();
-    let report = load(
-        &mut world,
-        &SceneSource::BuiltIn("bust"),
-        &LoadOptions::default(),
-    )
-    .unwrap();
+    let report = load(&mut world, &SceneSource::BuiltIn("bust"), &LoadOptions::default()).unwrap();
     assert_eq!(report.triangles, 968 + 2);
 }
 
@@ -218,20 +175,13 @@ fn the_bust_has_as_many_triangles_as_its_name_says() {
 fn both_cornell_boxes_have_the_same_walls() {
     let area = |name: &'static str| {
         let mut world = World::new();
-        load(
-            &mut world,
-            &SceneSource::BuiltIn(name),
-            &LoadOptions::default(),
-        )
-        .unwrap();
+        load(&mut world, &SceneSource::BuiltIn(name), &LoadOptions::default()).unwrap();
         let mut query = world.query::<(&Instance, &GlobalTransform)>();
         let mut sum = 0.0;
         for (instance, transform) in query.iter(&world) {
             let mesh = &world.get::<Mesh>(instance.mesh).unwrap().0;
             for i in 0..mesh.triangles.len() {
-                let [a, b, c] = mesh
-                    .corners(i)
-                    .map(|p| transform.0.transform_point3(p.as_dvec3()));
+                let [a, b, c] = mesh.corners(i).map(|p| transform.0.transform_point3(p.as_dvec3()));
                 sum += 0.5 * (b - a).cross(c - a).length();
             }
         }
@@ -243,35 +193,23 @@ fn both_cornell_boxes_have_the_same_walls() {
 
 #[test]
 fn arguments_are_files_or_names_with_a_hint() {
-    assert_eq!(
-        SceneSource::parse("no/such.glb").unwrap(),
-        SceneSource::File(PathBuf::from("no/such.glb"))
-    );
+    assert_eq!(SceneSource::parse("no/such.glb").unwrap(), SceneSource::File(PathBuf::from("no/such.glb")));
     assert_eq!(SceneSource::parse("no/such.glb").unwrap().name(), "such");
     assert_eq!(SceneSource::parse("cornell").unwrap().name(), "cornell");
     let message = SceneSource::parse("cornel").unwrap_err().to_string();
     assert_says(&message, "did you mean `cornell`?");
     assert_says(&message, "gallery");
-    let error = load(
-        &mut World::new(),
-        &SceneSource::File(PathBuf::from("no/such.glb")),
-        &LoadOptions::default(),
-    )
-    .unwrap_err();
+    let error =
+        load(&mut World::new(), &SceneSource::File(PathBuf::from("no/such.glb")), &LoadOptions::default())
+            .unwrap_err();
     assert_says(&error.to_string(), "no/such.glb: no such file");
-    let error = load(
-        &mut World::new(),
-        &SceneSource::File(Path::new("/").to_path_buf()),
-        &LoadOptions::default(),
-    )
-    .unwrap_err();
+    let error =
+        load(&mut World::new(), &SceneSource::File(Path::new("/").to_path_buf()), &LoadOptions::default())
+            .unwrap_err();
     assert_says(&error.to_string(), "not a regular file");
 }
 
 #[test]
 fn a_file_of_unknown_format_is_refused_with_what_is_read() {
-    assert_says(
-        &refusal("a.fbx", "Kaydara"),
-        "Penumbra reads .gltf, .glb, .obj and .toml",
-    );
+    assert_says(&refusal("a.fbx", "Kaydara"), "Penumbra reads .gltf, .glb, .obj and .toml");
 }

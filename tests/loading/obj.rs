@@ -7,14 +7,7 @@ fn a_quad_is_two_triangles_in_one_mesh_and_one_instance() {
     let (mut world, report) = loaded("a.obj", &format!("{QUAD}f 1 2 3 4\n"));
     assert_eq!(report.triangles, 2);
     let mesh = only_mesh(&mut world);
-    assert_eq!(
-        (
-            mesh.positions.len(),
-            mesh.normals.len(),
-            mesh.triangles.len()
-        ),
-        (4, 0, 2)
-    );
+    assert_eq!((mesh.positions.len(), mesh.normals.len(), mesh.triangles.len()), (4, 0, 2));
     assert_eq!(world.query::<&Instance>().iter(&world).count(), 1);
 }
 
@@ -44,28 +37,18 @@ fn illumination_models_become_mirror_glass_and_emission() {
     assert_eq!(named::<Material>(&mut world, "m").mirror, Vec3::splat(0.9));
     let glass = named::<Material>(&mut world, "g").glass.unwrap();
     assert_eq!((glass.ior, glass.tint), (1.33, Vec3::new(1.0, 0.5, 1.0)));
-    assert_eq!(
-        named::<Material>(&mut world, "e").emission,
-        Vec3::new(3.0, 2.0, 1.0)
-    );
+    assert_eq!(named::<Material>(&mut world, "e").emission, Vec3::new(3.0, 2.0, 1.0));
     let thin = named::<Material>(&mut world, "t");
     assert_eq!((thin.opacity, thin.alpha), (0.75, Alpha::Blend));
     assert_eq!(
         named::<Material>(&mut world, "p").glossy,
-        Glossy::Ggx {
-            metallic: 1.0,
-            roughness: 0.3,
-            texture: None
-        }
+        Glossy::Ggx { metallic: 1.0, roughness: 0.3, texture: None }
     );
 }
 
 #[test]
 fn texture_coordinates_are_turned_upside_down() {
-    let (mut world, _) = loaded(
-        "a.obj",
-        &format!("{QUAD}vt 0.25 0.125\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n"),
-    );
+    let (mut world, _) = loaded("a.obj", &format!("{QUAD}vt 0.25 0.125\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n"));
     assert_eq!(only_mesh(&mut world).uvs[0], Vec2::new(0.25, 0.875));
 }
 
@@ -78,16 +61,9 @@ fn smoothing_groups_share_normals_and_no_group_is_flat() {
     let (mut world, _) = loaded("a.obj", &format!("{roof}s 1\n{faces}"));
     let mesh = only_mesh(&mut world);
     assert_eq!(mesh.positions.len(), 6);
-    let ridge = mesh
-        .positions
-        .iter()
-        .position(|p| *p == Vec3::new(1., 1., 0.))
-        .unwrap();
+    let ridge = mesh.positions.iter().position(|p| *p == Vec3::new(1., 1., 0.)).unwrap();
     assert!((mesh.normals[ridge] - Vec3::Y).length() < 1e-6);
-    let (mut world, _) = loaded(
-        "a.obj",
-        &format!("{roof}s 1\nf 1 2 5 4\ns off\nf 2 3 6 5\n"),
-    );
+    let (mut world, _) = loaded("a.obj", &format!("{roof}s 1\nf 1 2 5 4\ns off\nf 2 3 6 5\n"));
     assert_eq!(only_mesh(&mut world).positions.len(), 8);
 }
 
@@ -99,22 +75,13 @@ fn negative_indices_tabs_continuations_and_carriage_returns_work() {
 
 #[test]
 fn vertex_colours_are_kept() {
-    let (mut world, _) = loaded(
-        "a.obj",
-        "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n",
-    );
-    assert_eq!(
-        only_mesh(&mut world).colors[1].to_array(),
-        [0.0, 1.0, 0.0, 1.0]
-    );
+    let (mut world, _) = loaded("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n");
+    assert_eq!(only_mesh(&mut world).colors[1].to_array(), [0.0, 1.0, 0.0, 1.0]);
 }
 
 #[test]
 fn a_missing_library_is_a_warning_that_names_it() {
-    let (_, report) = loaded(
-        "a.obj",
-        &format!("mtllib gone.mtl\nusemtl x\n{QUAD}f 1 2 3\n"),
-    );
+    let (_, report) = loaded("a.obj", &format!("mtllib gone.mtl\nusemtl x\n{QUAD}f 1 2 3\n"));
     let warnings = report.warnings.join("\n");
     assert_says(&warnings, "gone.mtl");
     assert_says(&warnings, "`x` is not defined");
@@ -122,10 +89,7 @@ fn a_missing_library_is_a_warning_that_names_it() {
 
 #[test]
 fn libraries_outside_the_folder_are_not_opened() {
-    let (_, report) = loaded(
-        "a.obj",
-        &format!("mtllib ../../etc/hostname\n{QUAD}f 1 2 3\n"),
-    );
+    let (_, report) = loaded("a.obj", &format!("mtllib ../../etc/hostname\n{QUAD}f 1 2 3\n"));
     assert_says(&report.warnings.join("\n"), "outside");
 }
 
@@ -136,10 +100,7 @@ fn a_missing_texture_shows_a_checker_and_a_warning() {
     let (mut world, report) = loaded_all(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]);
     assert_says(&report.warnings.join("\n"), "no such.png");
     let texture = world.query::<&Texture>().single(&world).unwrap();
-    assert_eq!(
-        (texture.texels.texels[0], texture.wrap),
-        ([255, 0, 255, 255], [Wrap::Clamp; 2])
-    );
+    assert_eq!((texture.texels.texels[0], texture.wrap), ([255, 0, 255, 255], [Wrap::Clamp; 2]));
 }
 
 #[test]
@@ -153,45 +114,22 @@ fn coverage_comes_from_its_own_picture() {
         ("d.png", &cover),
     ]);
     assert_eq!(named::<Material>(&mut world, "m").alpha, Alpha::Blend);
-    assert_eq!(
-        world
-            .query::<&Texture>()
-            .single(&world)
-            .unwrap()
-            .texels
-            .texels,
-        [[10, 20, 30, 64]]
-    );
+    assert_eq!(world.query::<&Texture>().single(&world).unwrap().texels.texels, [[10, 20, 30, 64]]);
 }
 
 #[test]
 fn broken_lines_are_named() {
     assert_says(&refusal("a.obj", "v 0 0\n"), "line 1: vertex of 2");
-    assert_says(
-        &refusal("a.obj", &format!("{QUAD}f 1 2 9\n")),
-        "line 5: index out of range",
-    );
-    assert_says(
-        &refusal("a.obj", &format!("{QUAD}f 0 1 2\n")),
-        "line 5: index 0",
-    );
-    assert_says(
-        &refusal("a.obj", "v 0,0 1 2\n"),
-        "line 1: `0,0` is not a number",
-    );
-    assert_says(
-        &refusal("a.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-        "line 4: uses vertex 1",
-    );
+    assert_says(&refusal("a.obj", &format!("{QUAD}f 1 2 9\n")), "line 5: index out of range");
+    assert_says(&refusal("a.obj", &format!("{QUAD}f 0 1 2\n")), "line 5: index 0");
+    assert_says(&refusal("a.obj", "v 0,0 1 2\n"), "line 1: `0,0` is not a number");
+    assert_says(&refusal("a.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "line 4: uses vertex 1");
     assert_says(&refusal("a.obj", "v 0 0 0\0"), "binary");
 }
 
 #[test]
 fn numbers_too_large_drop_their_triangles_with_a_warning() {
-    let (_, report) = loaded(
-        "a.obj",
-        "v 1e400 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 2 3 4\n",
-    );
+    let (_, report) = loaded("a.obj", "v 1e400 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 2 3 4\n");
     assert_eq!(report.triangles, 1);
     assert_says(&report.warnings.join("\n"), "not finite");
 }

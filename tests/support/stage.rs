@@ -5,12 +5,8 @@
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DQuat, DVec3, UVec2, Vec2, Vec3};
 use penumbra::app::{App, FrameBudget, FrameStats};
-use penumbra::scene::{
-    ActiveCamera, Camera, Instance, Material, Mesh, Projection, Transform, TriangleMesh,
-};
-use penumbra::trace::{
-    Film, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint,
-};
+use penumbra::scene::{ActiveCamera, Camera, Instance, Material, Mesh, Projection, Transform, TriangleMesh};
+use penumbra::trace::{Film, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -19,10 +15,7 @@ pub struct Rng(pub u64);
 
 impl Rng {
     pub fn bits(&mut self) -> u32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let x = (((self.0 >> 18) ^ self.0) >> 27) as u32;
         x.rotate_right((self.0 >> 59) as u32)
     }
@@ -51,21 +44,13 @@ impl Rng {
         (sign * 10f64.powf(low + (high - low) * f64::from(self.unit()))) as f32
     }
     pub fn rotation(&mut self) -> DQuat {
-        DQuat::from_axis_angle(
-            self.direction().as_dvec3().normalize(),
-            f64::from(self.unit()) * 2.0 * PI,
-        )
+        DQuat::from_axis_angle(self.direction().as_dvec3().normalize(), f64::from(self.unit()) * 2.0 * PI)
     }
 }
 
 /// Settings of a small picture.
 pub fn settings(width: u32, height: u32, integrator: Integrator, max_depth: u32) -> RenderSettings {
-    RenderSettings {
-        size: UVec2::new(width, height),
-        integrator,
-        max_depth,
-        ..RenderSettings::default()
-    }
+    RenderSettings { size: UVec2::new(width, height), integrator, max_depth, ..RenderSettings::default() }
 }
 
 /// A world whose entities all hang under one root, so that the whole can be scaled and shifted.
@@ -89,22 +74,13 @@ impl Stage {
     }
 
     pub fn add(&mut self, thing: impl Bundle, place: DAffine3) -> Entity {
-        self.app
-            .world
-            .spawn((thing, Transform(place), ChildOf(self.root)))
-            .id()
+        self.app.world.spawn((thing, Transform(place), ChildOf(self.root))).id()
     }
 
     pub fn add_mesh(&mut self, mesh: TriangleMesh, material: Material, place: DAffine3) -> Entity {
         let mesh = self.app.world.spawn(Mesh(Arc::new(mesh))).id();
         let material = self.app.world.spawn(material).id();
-        self.add(
-            Instance {
-                mesh,
-                materials: vec![material],
-            },
-            place,
-        )
+        self.add(Instance { mesh, materials: vec![material] }, place)
     }
 
     /// An orthographic camera at `eye` whose picture of `target` is `width` wide and has its up side
@@ -112,24 +88,15 @@ impl Stage {
     pub fn look(&mut self, eye: DVec3, target: DVec3, up: DVec3, width: f64) {
         let size = self.app.world.resource::<RenderSettings>().size.as_dvec2();
         let height = (width * size.y / size.x * self.scale) as f32;
-        let camera = Camera {
-            projection: Projection::Orthographic { height },
-        };
+        let camera = Camera { projection: Projection::Orthographic { height } };
         let entity = self.add(camera, Transform::looking_at(eye, target, up).0);
         self.app.world.insert_resource(ActiveCamera(entity));
     }
 
     /// A perspective camera of 60 degrees.
     pub fn look_wide(&mut self, eye: DVec3, target: DVec3) {
-        let camera = Camera {
-            projection: Projection::Perspective {
-                vertical_fov: 60f32.to_radians(),
-            },
-        };
-        let entity = self.add(
-            camera,
-            Transform::looking_at(eye, target, DVec3::new(0.1, 1.0, 0.2)).0,
-        );
+        let camera = Camera { projection: Projection::Perspective { vertical_fov: 60f32.to_radians() } };
+        let entity = self.add(camera, Transform::looking_at(eye, target, DVec3::new(0.1, 1.0, 0.2)).0);
         self.app.world.insert_resource(ActiveCamera(entity));
     }
 
@@ -172,9 +139,7 @@ impl Stage {
 /// The red channel of every pixel, in rows from the top.
 pub fn reds(film: &Film) -> Vec<f64> {
     let size = film.size();
-    (0..size.y)
-        .flat_map(|y| (0..size.x).map(move |x| film.pixel(x, y).mean().x))
-        .collect()
+    (0..size.y).flat_map(|y| (0..size.x).map(move |x| film.pixel(x, y).mean().x)).collect()
 }
 
 /// A mean and its standard error.
@@ -191,17 +156,11 @@ impl Estimate {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        Self {
-            mean,
-            sigma: (variance / n).sqrt(),
-        }
+        Self { mean, sigma: (variance / n).sqrt() }
     }
 
     pub fn times(self, factor: f64) -> Self {
-        Self {
-            mean: self.mean * factor,
-            sigma: self.sigma * factor.abs(),
-        }
+        Self { mean: self.mean * factor, sigma: self.sigma * factor.abs() }
     }
 
     /// Panics unless `exact` lies within 4.5 standard errors (two-sided p = 7e-6), and unless those are
@@ -209,25 +168,10 @@ impl Estimate {
     pub fn assert_is(&self, name: &str, exact: f64, accuracy: f64) {
         let bound = 4.5 * self.sigma + ROUNDING * exact.abs();
         let off = self.mean - exact;
-        let relative = if exact == 0.0 {
-            bound
-        } else {
-            bound / exact.abs()
-        };
-        println!(
-            "{name}: {:.9} exact {exact:.9}, off {:+.1e}, bound {relative:.1e}",
-            self.mean,
-            off / exact
-        );
-        assert!(
-            relative <= accuracy,
-            "{name}: bound {relative:.1e} would accept too much"
-        );
-        assert!(
-            off.abs() <= bound,
-            "{name}: {} is not {exact}; bound {bound:.1e}",
-            self.mean
-        );
+        let relative = if exact == 0.0 { bound } else { bound / exact.abs() };
+        println!("{name}: {:.9} exact {exact:.9}, off {:+.1e}, bound {relative:.1e}", self.mean, off / exact);
+        assert!(relative <= accuracy, "{name}: bound {relative:.1e} would accept too much");
+        assert!(off.abs() <= bound, "{name}: {} is not {exact}; bound {bound:.1e}", self.mean);
     }
 }
 
@@ -248,14 +192,12 @@ pub fn grid(corner: Vec3, u: Vec3, v: Vec3, n: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for j in 0..=n {
         for i in 0..=n {
-            mesh.positions
-                .push(corner + u * (i as f32 / n as f32) + v * (j as f32 / n as f32));
+            mesh.positions.push(corner + u * (i as f32 / n as f32) + v * (j as f32 / n as f32));
         }
     }
     for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
         let a = j * (n + 1) + i;
-        mesh.triangles
-            .extend([[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]);
+        mesh.triangles.extend([[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]);
     }
     mesh
 }
@@ -264,20 +206,10 @@ pub fn grid(corner: Vec3, u: Vec3, v: Vec3, n: u32) -> TriangleMesh {
 pub fn cube() -> TriangleMesh {
     let positions =
         (0..8).map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0);
-    let faces = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     TriangleMesh {
         positions: positions.collect(),
-        triangles: faces
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
+        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
         ..TriangleMesh::default()
     }
 }
@@ -288,15 +220,9 @@ pub fn ball(rings: u32) -> TriangleMesh {
     let around = 2 * rings;
     for i in 0..=rings {
         for j in 0..around {
-            let (theta, phi) = (
-                PI * f64::from(i) / f64::from(rings),
-                2.0 * PI * f64::from(j) / f64::from(around),
-            );
-            let p = DVec3::new(
-                theta.sin() * phi.cos(),
-                theta.sin() * phi.sin(),
-                theta.cos(),
-            );
+            let (theta, phi) =
+                (PI * f64::from(i) / f64::from(rings), 2.0 * PI * f64::from(j) / f64::from(around));
+            let p = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
             mesh.positions.push(if i == 0 {
                 Vec3::Z
             } else if i == rings {
@@ -312,8 +238,7 @@ pub fn ball(rings: u32) -> TriangleMesh {
             mesh.triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
         }
         if i + 1 < rings {
-            mesh.triangles
-                .push([at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]);
+            mesh.triangles.push([at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]);
         }
     }
     mesh

@@ -39,9 +39,7 @@ impl<'a> Document<'a> {
     ) -> Result<Elements<'d>, LoadError> {
         let accessor = self.at(&self.root.accessors, index, "accessor", user)?;
         let place = format!("accessor {} ({user})", index.value());
-        let (Checked::Valid(kind), Checked::Valid(shape)) =
-            (accessor.component_type, accessor.type_)
-        else {
+        let (Checked::Valid(kind), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
             return Err(self.broken(place, "unknown component type or type"));
         };
         let kind = kind.0;
@@ -62,10 +60,9 @@ impl<'a> Document<'a> {
             }
             None if count <= MOST_ZEROS => None,
             None => {
-                return Err(self.broken(
-                    place,
-                    format!("count of {count} without a buffer view: limit {MOST_ZEROS}"),
-                ));
+                return Err(
+                    self.broken(place, format!("count of {count} without a buffer view: limit {MOST_ZEROS}"))
+                );
             }
         };
         let sparse = match &accessor.sparse {
@@ -73,15 +70,7 @@ impl<'a> Document<'a> {
             None => None,
         };
         let normalized = accessor.normalized;
-        Ok(Elements {
-            place,
-            count: count as usize,
-            width,
-            kind,
-            normalized,
-            dense,
-            sparse,
-        })
+        Ok(Elements { place, count: count as usize, width, kind, normalized, dense, sparse })
     }
 
     /// `count` elements of `size` bytes in a view, at its stride.
@@ -96,16 +85,11 @@ impl<'a> Document<'a> {
         let (bytes, stride) = self.view(view, place)?;
         let stride = stride.unwrap_or(size);
         if stride < size {
-            return Err(self.broken(
-                place,
-                format!("stride of {stride} below the element's {size} bytes"),
-            ));
+            return Err(self.broken(place, format!("stride of {stride} below the element's {size} bytes")));
         }
         let needed = match count.checked_sub(1) {
             None => Some(0),
-            Some(before) => before
-                .checked_mul(stride as u64)
-                .and_then(|n| n.checked_add(size as u64)),
+            Some(before) => before.checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)),
         };
         let available = (bytes.len() as u64).checked_sub(offset);
         match (needed, available) {
@@ -116,10 +100,7 @@ impl<'a> Document<'a> {
             _ => {
                 let length = bytes.len();
                 let what = format!("count {count} at offset {offset}, stride {stride}");
-                Err(self.broken(
-                    place,
-                    format!("out of range: {what} in a buffer view of {length} bytes"),
-                ))
+                Err(self.broken(place, format!("out of range: {what} in a buffer view of {length} bytes")))
             }
         }
     }
@@ -144,13 +125,8 @@ impl<'a> Document<'a> {
             kind.size(),
             &place,
         )?;
-        let values = self.dense(
-            &sparse.values.buffer_view,
-            sparse.values.byte_offset.0,
-            replaced,
-            size,
-            &place,
-        )?;
+        let values =
+            self.dense(&sparse.values.buffer_view, sparse.values.byte_offset.0, replaced, size, &place)?;
         let mut order = Vec::with_capacity(replaced as usize);
         for slot in 0..replaced as usize {
             let index = component(indices.bytes, slot * indices.stride, kind) as u32;
@@ -197,33 +173,24 @@ impl Elements<'_> {
 
     /// Whether its components are of one of the types that glTF allows for indices.
     pub(super) fn is_index_type(&self) -> bool {
-        matches!(
-            self.kind,
-            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
-        ) && self.width == 1
+        matches!(self.kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) && self.width == 1
     }
 
     fn locate(&self, i: usize) -> (&[u8], usize) {
         if let Some((order, values)) = &self.sparse
-            && let Some(&(_, slot)) =
-                order[..order.partition_point(|&(index, _)| index as usize <= i)].last()
+            && let Some(&(_, slot)) = order[..order.partition_point(|&(index, _)| index as usize <= i)].last()
             && order.binary_search(&(i as u32, slot)).is_ok()
         {
             return (values, slot as usize * self.width * self.kind.size());
         }
-        self.dense
-            .as_ref()
-            .map_or((&[], 0), |dense| (dense.bytes, i * dense.stride))
+        self.dense.as_ref().map_or((&[], 0), |dense| (dense.bytes, i * dense.stride))
     }
 }
 
 /// One component; what lies outside (an accessor of zeros) is 0.
 fn component(bytes: &[u8], at: usize, kind: ComponentType) -> f64 {
     fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-        bytes
-            .get(at..at + N)
-            .and_then(|slice| slice.try_into().ok())
-            .unwrap_or([0; N])
+        bytes.get(at..at + N).and_then(|slice| slice.try_into().ok()).unwrap_or([0; N])
     }
     match kind {
         ComponentType::I8 => f64::from(i8::from_le_bytes(array(bytes, at))),

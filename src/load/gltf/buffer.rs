@@ -12,11 +12,7 @@ pub(super) struct Buffer<'a> {
 }
 
 /// Gets all buffers.
-pub(super) fn read_all<'a>(
-    root: &Root,
-    folder: &Folder,
-    binary: Option<&'a [u8]>,
-) -> Vec<Buffer<'a>> {
+pub(super) fn read_all<'a>(root: &Root, folder: &Folder, binary: Option<&'a [u8]>) -> Vec<Buffer<'a>> {
     let one = |(i, buffer): (usize, &gltf::json::Buffer)| {
         let data = match (&buffer.uri, binary) {
             (Some(uri), _) => {
@@ -30,10 +26,7 @@ pub(super) fn read_all<'a>(
             if data.len() as u64 >= wanted {
                 Ok(data)
             } else {
-                Err(format!(
-                    "too short: byteLength is {wanted}, the data has {} bytes",
-                    data.len()
-                ))
+                Err(format!("too short: byteLength is {wanted}, the data has {} bytes", data.len()))
             }
         });
         Buffer { data: checked }
@@ -70,11 +63,7 @@ pub(super) fn shorten(uri: &str) -> String {
 
 impl<'a> Document<'a> {
     /// The bytes of a buffer view and its stride.
-    pub(super) fn view(
-        &self,
-        index: &Index<View>,
-        user: &str,
-    ) -> Result<(&[u8], Option<usize>), LoadError> {
+    pub(super) fn view(&self, index: &Index<View>, user: &str) -> Result<(&[u8], Option<usize>), LoadError> {
         let view = self.at(&self.root.buffer_views, index, "buffer view", user)?;
         let place = || format!("buffer view {}", index.value());
         self.at(&self.root.buffers, &view.buffer, "buffer", &place())?;
@@ -93,9 +82,7 @@ impl<'a> Document<'a> {
             let size = data.len();
             self.broken(
                 place(),
-                format!(
-                    "out of bounds: offset {offset} + length {length} in a buffer of {size} bytes"
-                ),
+                format!("out of bounds: offset {offset} + length {length} in a buffer of {size} bytes"),
             )
         })?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
@@ -103,13 +90,8 @@ impl<'a> Document<'a> {
 }
 
 fn decode_data(data: &str) -> Result<Vec<u8>, ReadError> {
-    let (head, body) = data
-        .split_once(',')
-        .ok_or(ReadError::Data("data URI without a comma"))?;
-    if head
-        .split(';')
-        .any(|word| word.eq_ignore_ascii_case("base64"))
-    {
+    let (head, body) = data.split_once(',').ok_or(ReadError::Data("data URI without a comma"))?;
+    if head.split(';').any(|word| word.eq_ignore_ascii_case("base64")) {
         decode_base64(body).ok_or(ReadError::Data("data URI is not valid base64"))
     } else {
         Ok(percent_decoded(body))
@@ -121,12 +103,7 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let (mut pending, mut bits) = (0_u32, 0_u32);
     let digits = text.bytes().filter(|byte| !byte.is_ascii_whitespace());
-    let padding = text
-        .trim_end()
-        .bytes()
-        .rev()
-        .take_while(|&byte| byte == b'=')
-        .count();
+    let padding = text.trim_end().bytes().rev().take_while(|&byte| byte == b'=').count();
     let count = digits.clone().count().checked_sub(padding)?;
     if padding > 2 || count % 4 == 1 {
         return None;
@@ -176,14 +153,8 @@ mod tests {
 
     #[test]
     fn base64_is_read_with_and_without_padding() {
-        assert_eq!(
-            decode_base64("aGFsbG8=").as_deref(),
-            Some(b"hallo".as_slice())
-        );
-        assert_eq!(
-            decode_base64("aGFs\nbG8").as_deref(),
-            Some(b"hallo".as_slice())
-        );
+        assert_eq!(decode_base64("aGFsbG8=").as_deref(), Some(b"hallo".as_slice()));
+        assert_eq!(decode_base64("aGFs\nbG8").as_deref(), Some(b"hallo".as_slice()));
         assert_eq!(decode_base64("aGFsbG8*"), None);
         assert_eq!(decode_base64("a"), None);
         assert_eq!(decode_base64("a="), None);

@@ -11,43 +11,27 @@ pub(super) struct Container<'a> {
 /// Splits by the first bytes, not by the name. Every length is checked against the file's.
 pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, LoadError> {
     if bytes.is_empty() {
-        return Err(LoadError::broken(
-            file,
-            "content",
-            "the file is empty, not JSON",
-        ));
+        return Err(LoadError::broken(file, "content", "the file is empty, not JSON"));
     }
     if !bytes.starts_with(b"glTF") {
-        return Ok(Container {
-            json: bytes,
-            binary: None,
-        });
+        return Ok(Container { json: bytes, binary: None });
     }
     let damaged = |problem: String| LoadError::broken(file, "GLB header", problem);
     let (Some(version), Some(total)) = (word(bytes, 4), word(bytes, 8)) else {
-        return Err(damaged(
-            "truncated: shorter than a header of 12 bytes".to_owned(),
-        ));
+        return Err(damaged("truncated: shorter than a header of 12 bytes".to_owned()));
     };
     if version != 2 {
-        return Err(damaged(format!(
-            "container version {version}; Penumbra reads version 2"
-        )));
+        return Err(damaged(format!("container version {version}; Penumbra reads version 2")));
     }
     if total as u64 > bytes.len() as u64 {
-        let problem = format!(
-            "truncated: says a length of {total} bytes, the file has {}",
-            bytes.len()
-        );
+        let problem = format!("truncated: says a length of {total} bytes, the file has {}", bytes.len());
         return Err(damaged(problem));
     }
     let mut rest = &bytes[12..(total as usize).max(12)];
     let (mut json, mut binary) = (None, None);
     while !rest.is_empty() {
         let (Some(length), Some(kind)) = (word(rest, 0), word(rest, 4)) else {
-            return Err(damaged(
-                "truncated: incomplete chunk header at the end".to_owned(),
-            ));
+            return Err(damaged("truncated: incomplete chunk header at the end".to_owned()));
         };
         let Some(data) = rest[8..].get(..length as usize) else {
             let left = rest.len() - 8;
@@ -61,19 +45,12 @@ pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, Lo
             _ => {} // The specification asks to skip what is not known.
         }
         // An odd length at the very end would point past it.
-        rest = rest
-            .get(8 + (length as usize).next_multiple_of(4)..)
-            .unwrap_or_default();
+        rest = rest.get(8 + (length as usize).next_multiple_of(4)..).unwrap_or_default();
     }
-    let json =
-        json.ok_or_else(|| damaged("no JSON chunk: length too small or wrong type".to_owned()))?;
+    let json = json.ok_or_else(|| damaged("no JSON chunk: length too small or wrong type".to_owned()))?;
     Ok(Container { json, binary })
 }
 
 fn word(bytes: &[u8], at: usize) -> Option<u32> {
-    bytes
-        .get(at..at + 4)?
-        .try_into()
-        .ok()
-        .map(u32::from_le_bytes)
+    bytes.get(at..at + 4)?.try_into().ok().map(u32::from_le_bytes)
 }

@@ -21,18 +21,10 @@ pub(super) fn light_of(
     user: &str,
     sink: &mut Sink<'_>,
 ) -> Result<Option<Light>, LoadError> {
-    let Some(named) = node
-        .extensions
-        .as_ref()
-        .and_then(|e| e.khr_lights_punctual.as_ref())
-    else {
+    let Some(named) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) else {
         return Ok(None);
     };
-    let lights = document
-        .root
-        .extensions
-        .as_ref()
-        .and_then(|e| e.khr_lights_punctual.as_ref());
+    let lights = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
     let lights = lights.map_or(&[][..], |extension| &extension.lights);
     let light = document.at(lights, &named.light, "light", user)?;
     let file = document.file;
@@ -43,48 +35,30 @@ pub(super) fn light_of(
     };
     let power = Vec3::from(light.color) * light.intensity / LUMEN_PER_WATT;
     if !power.is_finite() || power.min_element() < 0.0 {
-        sink.warn(format!(
-            "{file}: {place}: colour or intensity negative or not finite, ignored"
-        ));
+        sink.warn(format!("{file}: {place}: colour or intensity negative or not finite, ignored"));
         return Ok(None);
     }
     if light.range.is_some() {
-        sink.warn(format!(
-            "{file}: the range of lights is ignored: they reach as far as light does"
-        ));
+        sink.warn(format!("{file}: the range of lights is ignored: they reach as far as light does"));
     }
-    sink.decide(format!("{file}: punctual lights are in candela and lux as the format says: 683 make one W/sr or W/m²"));
+    sink.decide(format!(
+        "{file}: punctual lights are in candela and lux as the format says: 683 make one W/sr or W/m²"
+    ));
     Ok(Some(match kind {
         LightType::Point => Light::Point { intensity: power },
-        LightType::Directional => Light::Directional {
-            irradiance: power,
-            angle: 0.0,
-        },
+        LightType::Directional => Light::Directional { irradiance: power, angle: 0.0 },
         LightType::Spot => {
-            let (inner, outer) = light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| {
-                (s.inner_cone_angle, s.outer_cone_angle)
-            });
+            let (inner, outer) =
+                light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| (s.inner_cone_angle, s.outer_cone_angle));
             let legal = inner >= 0.0 && inner < outer && outer <= FRAC_PI_2;
             if !legal {
                 sink.warn(format!(
                     "{file}: {place}: spot cone angles out of order ({inner}, {outer}), mended"
                 ));
             }
-            let outer_angle = if outer.is_finite() {
-                outer.clamp(1e-3, FRAC_PI_2)
-            } else {
-                FRAC_PI_4
-            };
-            let inner_angle = if inner.is_finite() {
-                inner.clamp(0.0, outer_angle * 0.999)
-            } else {
-                0.0
-            };
-            Light::Spot {
-                intensity: power,
-                inner_angle,
-                outer_angle,
-            }
+            let outer_angle = if outer.is_finite() { outer.clamp(1e-3, FRAC_PI_2) } else { FRAC_PI_4 };
+            let inner_angle = if inner.is_finite() { inner.clamp(0.0, outer_angle * 0.999) } else { 0.0 };
+            Light::Spot { intensity: power, inner_angle, outer_angle }
         }
     }))
 }
@@ -103,19 +77,12 @@ pub(super) fn camera_of(
     let name = node.name.clone().or_else(|| camera.name.clone());
     let name = name.unwrap_or_else(|| format!("camera {}", index.value()));
     let mut mend = |what: &str| {
-        sink.warn(format!(
-            "{}: camera {}: {what}",
-            document.file,
-            index.value()
-        ));
+        sink.warn(format!("{}: camera {}: {what}", document.file, index.value()));
     };
     let projection = match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(CameraType::Perspective), Some(perspective), _) => {
             let fov = perspective.yfov;
-            if perspective
-                .aspect_ratio
-                .is_some_and(|aspect| !(aspect.is_finite() && aspect > 0.0))
-            {
+            if perspective.aspect_ratio.is_some_and(|aspect| !(aspect.is_finite() && aspect > 0.0)) {
                 mend("aspect ratio out of range, ignored as always: the picture decides");
             }
             if fov > 0.0 && fov < PI {

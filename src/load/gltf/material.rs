@@ -32,9 +32,7 @@ impl Palette {
     /// The material for primitives without one, spawned when it is first needed.
     pub(super) fn default_material(&mut self, file: &str, sink: &mut Sink<'_>) -> Entity {
         *self.default.get_or_insert_with(|| {
-            sink.decide(format!(
-                "{file}: surfaces without a material are light grey"
-            ));
+            sink.decide(format!("{file}: surfaces without a material are light grey"));
             sink.spawn((Name::new("default"), Material::default()))
         })
     }
@@ -48,26 +46,13 @@ pub(super) fn spawn_all(
 ) -> Result<Palette, LoadError> {
     if let Some(all) = overrides.all {
         let count = document.root.materials.len();
-        return Ok(Palette {
-            materials: vec![all; count],
-            default: Some(all),
-            uv_sets: vec![0; count],
-        });
+        return Ok(Palette { materials: vec![all; count], default: Some(all), uv_sets: vec![0; count] });
     }
     let mut textures = Textures::new(document, sink)?;
-    let mut palette = Palette {
-        materials: Vec::new(),
-        default: None,
-        uv_sets: Vec::new(),
-    };
+    let mut palette = Palette { materials: Vec::new(), default: None, uv_sets: Vec::new() };
     for (i, material) in document.root.materials.iter().enumerate() {
-        let name = material
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("material {i}"));
-        palette
-            .uv_sets
-            .push(uv_set(document, material, &name, sink));
+        let name = material.name.clone().unwrap_or_else(|| format!("material {i}"));
+        palette.uv_sets.push(uv_set(document, material, &name, sink));
         let entity = match overrides.replacement(&name) {
             Some(entity) => entity,
             None => {
@@ -77,12 +62,7 @@ pub(super) fn spawn_all(
         };
         palette.materials.push(entity);
     }
-    let with_normal_map = document
-        .root
-        .materials
-        .iter()
-        .filter(|m| m.normal_texture.is_some())
-        .count();
+    let with_normal_map = document.root.materials.iter().filter(|m| m.normal_texture.is_some()).count();
     if with_normal_map > 0 {
         sink.warn(format!(
             "{}: normal maps are not supported and ignored ({with_normal_map} materials)",
@@ -93,17 +73,14 @@ pub(super) fn spawn_all(
 }
 
 /// A mesh has one set of texture coordinates: the one that the first texture asks for.
-fn uv_set(
-    document: &Document<'_>,
-    material: &json::Material,
-    name: &str,
-    sink: &mut Sink<'_>,
-) -> u32 {
+fn uv_set(document: &Document<'_>, material: &json::Material, name: &str, sink: &mut Sink<'_>) -> u32 {
     let uses = uses(material);
     let set = uses.first().map_or(0, |first| first.uv_set);
     if uses.iter().any(|other| other.uv_set != set) {
         let file = document.file;
-        sink.warn(format!("{file}: material `{name}`: its textures use several TEXCOORD sets; all get TEXCOORD_{set}"));
+        sink.warn(format!(
+            "{file}: material `{name}`: its textures use several TEXCOORD sets; all get TEXCOORD_{set}"
+        ));
     }
     set
 }
@@ -119,11 +96,7 @@ fn convert(
     let extensions = material.extensions.clone().unwrap_or_default();
     let clamped = Cell::new(false);
     let unit = |value: f32| {
-        let inside = if value.is_finite() {
-            value.clamp(0.0, 1.0)
-        } else {
-            1.0
-        };
+        let inside = if value.is_finite() { value.clamp(0.0, 1.0) } else { 1.0 };
         clamped.set(clamped.get() || inside != value);
         inside
     };
@@ -143,47 +116,30 @@ fn convert(
             && specular.max_element() > 0.25
             && specular.max_element() > diffuse.max_element();
         base_color = if is_metal { specular } else { diffuse };
-        (opacity, metallic, roughness) = (
-            a,
-            f32::from(u8::from(is_metal)),
-            1.0 - unit(old.glossiness_factor.0),
-        );
+        (opacity, metallic, roughness) =
+            (a, f32::from(u8::from(is_metal)), 1.0 - unit(old.glossiness_factor.0));
         (base_texture, rough_texture) = (old.diffuse_texture.as_ref(), None);
         sink.warn(format!(
             "{}: KHR_materials_pbrSpecularGlossiness is approximated by metal and roughness",
             document.file
         ));
     }
-    let strength = extensions
-        .emissive_strength
-        .as_ref()
-        .map_or(1.0, |e| e.emissive_strength.0);
+    let strength = extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength.0);
     let emission = Vec3::from(material.emissive_factor.0) * strength;
     let emission_is_legal = emission.is_finite() && emission.min_element() >= 0.0;
-    let transmission = extensions
-        .transmission
-        .as_ref()
-        .map_or(0.0, |t| unit(t.transmission_factor.0));
-    let is_glass =
-        transmission > GLASS_TRANSMISSION && roughness < GLASS_ROUGHNESS && metallic < 0.5;
+    let transmission = extensions.transmission.as_ref().map_or(0.0, |t| unit(t.transmission_factor.0));
+    let is_glass = transmission > GLASS_TRANSMISSION && roughness < GLASS_ROUGHNESS && metallic < 0.5;
     if transmission > 0.0 {
         let becomes = if is_glass { "clear glass" } else { "opaque" };
-        sink.decide(format!("{}: material `{name}` transmits {transmission} at roughness {roughness}: shown as {becomes}", document.file));
-    }
-    let ior = extensions.ior.as_ref().map_or(1.5, |ior| ior.ior.0);
-    let glass = Glass {
-        ior: if ior.is_finite() && ior >= 1.0 {
-            ior
-        } else {
-            1.5
-        },
-        tint: base_color,
-    };
-    if clamped.get() || !emission_is_legal {
-        sink.warn(format!(
-            "{}: material `{name}`: factor out of range, clamped",
+        sink.decide(format!(
+            "{}: material `{name}` transmits {transmission} at roughness {roughness}: shown as {becomes}",
             document.file
         ));
+    }
+    let ior = extensions.ior.as_ref().map_or(1.5, |ior| ior.ior.0);
+    let glass = Glass { ior: if ior.is_finite() && ior >= 1.0 { ior } else { 1.5 }, tint: base_color };
+    if clamped.get() || !emission_is_legal {
+        sink.warn(format!("{}: material `{name}`: factor out of range, clamped", document.file));
     }
     let unlit = extensions.unlit.is_some();
     Material {
@@ -195,28 +151,18 @@ fn convert(
             Glossy::None
         } else {
             let texture = rough_texture.and_then(|info| textures.get(info, Encoding::Linear, sink));
-            Glossy::Ggx {
-                metallic,
-                roughness,
-                texture,
-            }
+            Glossy::Ggx { metallic, roughness, texture }
         },
         mirror: Vec3::ZERO,
         glass: is_glass.then_some(glass),
-        emission: if emission_is_legal {
-            emission
-        } else {
-            Vec3::ZERO
-        },
+        emission: if emission_is_legal { emission } else { Vec3::ZERO },
         emission_texture: material
             .emissive_texture
             .as_ref()
             .filter(|_| emission != Vec3::ZERO)
             .and_then(|info| textures.get(info, Encoding::Srgb, sink)),
         alpha: match material.alpha_mode {
-            Checked::Valid(AlphaMode::Mask) => {
-                Alpha::Mask(unit(material.alpha_cutoff.unwrap_or_default().0))
-            }
+            Checked::Valid(AlphaMode::Mask) => Alpha::Mask(unit(material.alpha_cutoff.unwrap_or_default().0)),
             Checked::Valid(AlphaMode::Blend) => Alpha::Blend,
             Checked::Valid(AlphaMode::Opaque) | Checked::Invalid => Alpha::Opaque,
         },

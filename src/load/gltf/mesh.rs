@@ -67,39 +67,25 @@ impl Meshes {
                 )?,
                 None => palette.default_material(document.file, sink),
             };
-            let uv_set = primitive
-                .material
-                .as_ref()
-                .map_or(0, |m| palette.uv_sets[m.value()]);
+            let uv_set = primitive.material.as_ref().map_or(0, |m| palette.uv_sets[m.value()]);
             let joints = skin.map(|(_, joints)| joints);
-            let Some(mut part) = read_primitive(
-                document,
-                primitive,
-                uv_set,
-                &mesh.weights,
-                joints,
-                &place,
-                sink,
-            )?
+            let Some(mut part) =
+                read_primitive(document, primitive, uv_set, &mesh.weights, joints, &place, sink)?
             else {
                 continue;
             };
             self.triangles += part.triangles.len();
             if self.triangles > MOST_TRIANGLES {
-                return Err(document.broken(
-                    place,
-                    format!("more than {MOST_TRIANGLES} triangles: too large"),
-                ));
+                return Err(
+                    document.broken(place, format!("more than {MOST_TRIANGLES} triangles: too large"))
+                );
             }
-            let slot = materials
-                .iter()
-                .position(|&known| known == material)
-                .unwrap_or_else(|| {
-                    materials.push(material);
-                    materials.len() - 1
-                });
-            part.slot = u16::try_from(slot)
-                .map_err(|_| document.broken(&place, "more than 65536 materials"))?;
+            let slot = materials.iter().position(|&known| known == material).unwrap_or_else(|| {
+                materials.push(material);
+                materials.len() - 1
+            });
+            part.slot =
+                u16::try_from(slot).map_err(|_| document.broken(&place, "more than 65536 materials"))?;
             parts.push(part);
         }
         let done = geometry::finish(geometry::merge(parts));
@@ -109,11 +95,7 @@ impl Meshes {
         let name = mesh.name.clone().unwrap_or(label);
         let entity = (!done.mesh.triangles.is_empty())
             .then(|| sink.spawn((Name::new(name), Mesh(Arc::new(done.mesh)))));
-        let built = Built {
-            entity,
-            materials,
-            triangles: done.triangles,
-        };
+        let built = Built { entity, materials, triangles: done.triangles };
         self.built.insert(key, built.clone());
         Ok(built)
     }
@@ -133,40 +115,33 @@ fn read_primitive(
     let Checked::Valid(mode) = primitive.mode else {
         return Err(document.broken(place, "unknown mode (what the vertices form)"));
     };
-    if !matches!(
-        mode,
-        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-    ) {
+    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         sink.warn(format!(
             "{file}: {place}: mode {} (points or lines) has no triangles, skipped",
             mode.as_gl_enum()
         ));
         return Ok(None);
     }
-    let attribute =
-        |semantic: Semantic, width: &[usize]| -> Result<Option<Elements<'_>>, LoadError> {
-            let label = format!("{place}, {}", semantic.to_string());
-            let Some(index) = primitive.attributes.get(&Checked::Valid(semantic)) else {
-                return Ok(None);
-            };
-            let elements = document.elements(index, &label)?;
-            if !width.contains(&elements.width) {
-                return Err(document.broken(
-                    &elements.place,
-                    format!("attribute has {} components", elements.width),
-                ));
-            }
-            Ok(Some(elements))
+    let attribute = |semantic: Semantic, width: &[usize]| -> Result<Option<Elements<'_>>, LoadError> {
+        let label = format!("{place}, {}", semantic.to_string());
+        let Some(index) = primitive.attributes.get(&Checked::Valid(semantic)) else {
+            return Ok(None);
         };
+        let elements = document.elements(index, &label)?;
+        if !width.contains(&elements.width) {
+            return Err(
+                document.broken(&elements.place, format!("attribute has {} components", elements.width))
+            );
+        }
+        Ok(Some(elements))
+    };
     let Some(positions) = attribute(Semantic::Positions, &[3])? else {
         return Err(document.broken(place, "no POSITION: nothing says where its vertices are"));
     };
     let normals = attribute(Semantic::Normals, &[3])?;
     let mut uvs = attribute(Semantic::TexCoords(uv_set), &[2])?;
     if uvs.is_none() && uv_set != 0 {
-        sink.warn(format!(
-            "{file}: {place}: no TEXCOORD_{uv_set}, TEXCOORD_0 instead"
-        ));
+        sink.warn(format!("{file}: {place}: no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
         uvs = attribute(Semantic::TexCoords(0), &[2])?;
     }
     let colors = attribute(Semantic::Colors(0), &[3, 4])?;
@@ -176,20 +151,11 @@ fn read_primitive(
             .map(|(j, w)| (matrices, j, w)),
         None => None,
     };
-    let bound = skinning
-        .as_ref()
-        .map(|(_, joints, weights)| [joints, weights]);
+    let bound = skinning.as_ref().map(|(_, joints, weights)| [joints, weights]);
     let attributes = [normals.as_ref(), uvs.as_ref(), colors.as_ref()];
-    for other in attributes
-        .into_iter()
-        .flatten()
-        .chain(bound.into_iter().flatten())
-    {
+    for other in attributes.into_iter().flatten().chain(bound.into_iter().flatten()) {
         if other.count != positions.count {
-            let problem = format!(
-                "attribute has a count of {}, POSITION {}",
-                other.count, positions.count
-            );
+            let problem = format!("attribute has a count of {}, POSITION {}", other.count, positions.count);
             return Err(document.broken(&other.place, problem));
         }
     }
@@ -197,22 +163,10 @@ fn read_primitive(
     let morphs = Morphs::open(document, primitive, weights, positions.count, place)?;
     let vertices = used.vertices.iter().map(|&v| v as usize);
     let mut part = Part {
-        positions: vertices
-            .clone()
-            .map(|v| Vec3::from(morphs.apply(0, v, positions.get_f32(v))))
-            .collect(),
-        normals: normals.map(|n| {
-            vertices
-                .clone()
-                .map(|v| Vec3::from(morphs.apply(1, v, n.get_f32(v))))
-                .collect()
-        }),
-        uvs: uvs.map(|uvs| {
-            vertices
-                .clone()
-                .map(|v| Vec2::from(uvs.get_f32(v)))
-                .collect()
-        }),
+        positions: vertices.clone().map(|v| Vec3::from(morphs.apply(0, v, positions.get_f32(v)))).collect(),
+        normals: normals
+            .map(|n| vertices.clone().map(|v| Vec3::from(morphs.apply(1, v, n.get_f32(v)))).collect()),
+        uvs: uvs.map(|uvs| vertices.clone().map(|v| Vec2::from(uvs.get_f32(v))).collect()),
         colors: colors.map(|c| vertices.clone().map(|v| color(&c, v)).collect()),
         triangles: used.triangles,
         slot: 0,
@@ -225,9 +179,5 @@ fn read_primitive(
 
 fn color(colors: &Elements<'_>, vertex: usize) -> Vec4 {
     let rgba = Vec4::from(colors.get_f32::<4>(vertex));
-    if colors.width == 3 {
-        rgba.truncate().extend(1.0)
-    } else {
-        rgba
-    }
+    if colors.width == 3 { rgba.truncate().extend(1.0) } else { rgba }
 }

@@ -62,13 +62,7 @@ pub(super) fn load(
     let tree: Root = parse(file, json)?;
     let placements: Placements = parse(file, json)?;
     let buffers = buffer::read_all(&tree, folder, container.binary);
-    let document = Document {
-        file,
-        folder,
-        root: tree,
-        placements: placements.nodes,
-        buffers,
-    };
+    let document = Document { file, folder, root: tree, placements: placements.nodes, buffers };
     document.check_references()?;
     let materials = material::spawn_all(&document, overrides, sink)?;
     node::spawn_scene(&document, root, materials, sink)
@@ -94,42 +88,19 @@ impl Document<'_> {
         let root = &self.root;
         for (i, accessor) in root.accessors.iter().enumerate() {
             if let Some(view) = &accessor.buffer_view {
-                self.at(
-                    &root.buffer_views,
-                    view,
-                    "buffer view",
-                    &format!("accessor {i}"),
-                )?;
+                self.at(&root.buffer_views, view, "buffer view", &format!("accessor {i}"))?;
             }
         }
         for (i, view) in root.buffer_views.iter().enumerate() {
-            self.at(
-                &root.buffers,
-                &view.buffer,
-                "buffer",
-                &format!("buffer view {i}"),
-            )?;
+            self.at(&root.buffers, &view.buffer, "buffer", &format!("buffer view {i}"))?;
         }
         Ok(())
     }
 
     /// The object that `index` names, or an error that says who names it.
-    fn at<'l, T>(
-        &self,
-        list: &'l [T],
-        index: &Index<T>,
-        kind: &str,
-        user: &str,
-    ) -> Result<&'l T, LoadError> {
+    fn at<'l, T>(&self, list: &'l [T], index: &Index<T>, kind: &str, user: &str) -> Result<&'l T, LoadError> {
         list.get(index.value()).ok_or_else(|| {
-            self.broken(
-                user,
-                format!(
-                    "index out of range: names {kind} {} of {}",
-                    index.value(),
-                    list.len()
-                ),
-            )
+            self.broken(user, format!("index out of range: names {kind} {} of {}", index.value(), list.len()))
         })
     }
 }
@@ -185,23 +156,14 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
     let head: Head = parse(file, json)?;
     let version = |text: Option<String>| text.unwrap_or_else(|| "missing".to_owned());
     let Some(asset) = head.asset else {
-        return Err(LoadError::broken(
-            file,
-            "asset",
-            "not a glTF file: no `asset` with a version",
-        ));
+        return Err(LoadError::broken(file, "asset", "not a glTF file: no `asset` with a version"));
     };
     let asked = version(asset.min_version.clone().or(asset.version));
     if asked.is_empty() {
-        return Err(LoadError::broken(
-            file,
-            "asset",
-            "the version is empty; Penumbra reads glTF 2.0",
-        ));
+        return Err(LoadError::broken(file, "asset", "the version is empty; Penumbra reads glTF 2.0"));
     }
     if !asked.starts_with("2.") || (asset.min_version.is_some() && asked != "2.0") {
-        let problem =
-            format!("glTF version {asked}; Penumbra reads 2.0: export it again as glTF 2.0");
+        let problem = format!("glTF version {asked}; Penumbra reads 2.0: export it again as glTF 2.0");
         return Err(LoadError::broken(file, "asset", problem));
     }
     for extension in &head.extensions_required {
@@ -213,17 +175,10 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
             });
         }
     }
-    let ignored: Vec<&str> = head
-        .extensions_used
-        .iter()
-        .map(String::as_str)
-        .filter(|name| !SUPPORTED.contains(name))
-        .collect();
+    let ignored: Vec<&str> =
+        head.extensions_used.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect();
     if !ignored.is_empty() {
-        sink.warn(format!(
-            "{file}: extensions not supported and ignored: {}",
-            ignored.join(", ")
-        ));
+        sink.warn(format!("{file}: extensions not supported and ignored: {}", ignored.join(", ")));
     }
     Ok(())
 }

@@ -23,54 +23,32 @@ pub(super) fn spawn_scene(
 ) -> Result<(), LoadError> {
     let nodes = &document.root.nodes;
     if nodes.len() > MOST_NODES {
-        return Err(document.broken(
-            "nodes",
-            format!("{} nodes: the limit is {MOST_NODES}", nodes.len()),
-        ));
+        return Err(document.broken("nodes", format!("{} nodes: the limit is {MOST_NODES}", nodes.len())));
     }
     let parents = check_hierarchy(document)?;
     let roots = scene_roots(document, &parents, sink)?;
-    let local: Vec<DAffine3> = (0..nodes.len())
-        .map(|i| placement(document, i, sink))
-        .collect::<Result<_, _>>()?;
+    let local: Vec<DAffine3> =
+        (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
     let order = top_down(document, &roots);
     let mut world: Vec<Option<DAffine3>> = vec![None; nodes.len()];
     for &i in &order {
-        let above = parents[i]
-            .and_then(|parent| world[parent])
-            .unwrap_or(DAffine3::IDENTITY);
+        let above = parents[i].and_then(|parent| world[parent]).unwrap_or(DAffine3::IDENTITY);
         world[i] = Some(above * local[i]);
     }
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
-        sink.decide(format!(
-            "{}: no node in it; shows each mesh once",
-            document.file
-        ));
+        sink.decide(format!("{}: no node in it; shows each mesh once", document.file));
         for i in 0..document.root.meshes.len() {
-            let built = meshes.get(
-                document,
-                &Index::new(i as u32),
-                None,
-                &mut palette,
-                "file",
-                sink,
-            )?;
-            let entity = sink.spawn((
-                Name::new(format!("mesh {i}")),
-                Transform::default(),
-                ChildOf(root),
-            ));
+            let built = meshes.get(document, &Index::new(i as u32), None, &mut palette, "file", sink)?;
+            let entity = sink.spawn((Name::new(format!("mesh {i}")), Transform::default(), ChildOf(root)));
             instantiate(&built, entity, sink);
         }
     }
     for &i in &order {
         let node = &nodes[i];
         let user = format!("node {i}");
-        let parent = parents[i]
-            .and_then(|parent| entities[parent])
-            .unwrap_or(root);
+        let parent = parents[i].and_then(|parent| entities[parent]).unwrap_or(root);
         let name = Name::new(node.name.clone().unwrap_or_else(|| user.clone()));
         let entity = sink.spawn((name, Transform(local[i]), ChildOf(parent)));
         entities[i] = Some(entity);
@@ -86,9 +64,7 @@ pub(super) fn spawn_scene(
                 Some(index) => Some((index.value(), skin::joints(document, index, &world, &user)?)),
                 None => None,
             };
-            let posed = joints
-                .as_ref()
-                .map(|(skin, joints)| (*skin, joints.as_slice()));
+            let posed = joints.as_ref().map(|(skin, joints)| (*skin, joints.as_slice()));
             let built = meshes.get(document, mesh, posed, &mut palette, &user, sink)?;
             if posed.is_some() {
                 // The format: the transform of a skinned mesh's own node does not count.
@@ -112,41 +88,24 @@ fn place(
     user: &str,
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
-    let others = node
-        .extensions
-        .as_ref()
-        .map(|extensions| &extensions.others);
-    let Some(lists) =
-        others.and_then(|others| others.get("EXT_mesh_gpu_instancing")?.get("attributes"))
+    let others = node.extensions.as_ref().map(|extensions| &extensions.others);
+    let Some(lists) = others.and_then(|others| others.get("EXT_mesh_gpu_instancing")?.get("attributes"))
     else {
         instantiate(built, entity, sink);
         return Ok(());
     };
     let open = |name: &str, width: usize| {
-        let index = lists
-            .get(name)
-            .and_then(serde_json::Value::as_u64)
-            .and_then(|i| u32::try_from(i).ok());
+        let index = lists.get(name).and_then(serde_json::Value::as_u64).and_then(|i| u32::try_from(i).ok());
         let Some(index) = index else { return Ok(None) };
-        let elements =
-            document.elements(&Index::new(index), &format!("{user}, instances {name}"))?;
+        let elements = document.elements(&Index::new(index), &format!("{user}, instances {name}"))?;
         if elements.width == width {
             Ok(Some(elements))
         } else {
             Err(document.broken(user, format!("instances: {name} of a wrong type")))
         }
     };
-    let (translation, rotation, scale) = (
-        open("TRANSLATION", 3)?,
-        open("ROTATION", 4)?,
-        open("SCALE", 3)?,
-    );
-    let counts = || {
-        [&translation, &rotation, &scale]
-            .into_iter()
-            .flatten()
-            .map(|elements| elements.count)
-    };
+    let (translation, rotation, scale) = (open("TRANSLATION", 3)?, open("ROTATION", 4)?, open("SCALE", 3)?);
+    let counts = || [&translation, &rotation, &scale].into_iter().flatten().map(|elements| elements.count);
     let count = counts().max().unwrap_or(0);
     if counts().any(|other| other != count) || sink.spawned().len() + count > MOST_NODES {
         return Err(document.broken(user, "instances: lists of unequal or too large count"));
@@ -168,10 +127,7 @@ fn place(
 fn instantiate(built: &Built, entity: Entity, sink: &mut Sink<'_>) {
     sink.report.triangles += built.triangles;
     if let Some(mesh) = built.entity {
-        sink.world.entity_mut(entity).insert(Instance {
-            mesh,
-            materials: built.materials.clone(),
-        });
+        sink.world.entity_mut(entity).insert(Instance { mesh, materials: built.materials.clone() });
     }
 }
 
@@ -186,11 +142,7 @@ impl Placement {
         let [x, y, z, w] = self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
         let stored = DQuat::from_xyzw(x, y, z, w);
         let length = stored.length();
-        let rotation = if length > 0.0 && length.is_finite() {
-            stored / length
-        } else {
-            DQuat::IDENTITY
-        };
+        let rotation = if length > 0.0 && length.is_finite() { stored / length } else { DQuat::IDENTITY };
         let translation = self.translation.map_or(DVec3::ZERO, DVec3::from);
         let scale = self.scale.map_or(DVec3::ONE, DVec3::from);
         let affine = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
@@ -198,11 +150,7 @@ impl Placement {
     }
 }
 
-fn placement(
-    document: &Document<'_>,
-    i: usize,
-    sink: &mut Sink<'_>,
-) -> Result<DAffine3, LoadError> {
+fn placement(document: &Document<'_>, i: usize, sink: &mut Sink<'_>) -> Result<DAffine3, LoadError> {
     let Some(placement) = document.placements.get(i) else {
         return Ok(DAffine3::IDENTITY);
     };
@@ -229,9 +177,8 @@ fn check_hierarchy(document: &Document<'_>) -> Result<Vec<Option<usize>>, LoadEr
         for child in node.children.iter().flatten() {
             document.at(nodes, child, "child node", &format!("node {i}"))?;
             if let Some(first) = parents[child.value()].replace(i) {
-                let problem = format!(
-                    "has two parents, node {first} and node {i}: the hierarchy is not a tree"
-                );
+                let problem =
+                    format!("has two parents, node {first} and node {i}: the hierarchy is not a tree");
                 return Err(document.broken(format!("node {}", child.value()), problem));
             }
         }
@@ -244,10 +191,8 @@ fn check_hierarchy(document: &Document<'_>) -> Result<Vec<Option<usize>>, LoadEr
         while let Some(i) = here.filter(|&i| !reaches_root[i]) {
             path.push(i);
             if path.len() > nodes.len() {
-                return Err(document.broken(
-                    format!("node {start}"),
-                    "is its own ancestor: a cycle in the node hierarchy",
-                ));
+                return Err(document
+                    .broken(format!("node {start}"), "is its own ancestor: a cycle in the node hierarchy"));
             }
             here = parents[i];
         }
@@ -272,18 +217,13 @@ fn scene_roots(
     };
     if root.scenes.len() > 1 {
         let shown = root.scene.as_ref().map_or(0, Index::value);
-        sink.decide(format!(
-            "{file}: has {} scenes; shows scene {shown}",
-            root.scenes.len()
-        ));
+        sink.decide(format!("{file}: has {} scenes; shows scene {shown}", root.scenes.len()));
     }
     let Some(scene) = scene else {
         if !parents.is_empty() {
             sink.decide(format!("{file}: no scene in it; shows all nodes"));
         }
-        return Ok((0..parents.len())
-            .filter(|&i| parents[i].is_none())
-            .collect());
+        return Ok((0..parents.len()).filter(|&i| parents[i].is_none()).collect());
     };
     let mut listed = vec![false; parents.len()];
     for node in &scene.nodes {
@@ -291,9 +231,7 @@ fn scene_roots(
         listed[node.value()] = true;
     }
     // Below a listed node: found from the tops down, so that no chain is walked twice.
-    let tops: Vec<usize> = (0..parents.len())
-        .filter(|&i| parents[i].is_none())
-        .collect();
+    let tops: Vec<usize> = (0..parents.len()).filter(|&i| parents[i].is_none()).collect();
     let mut shown_above = vec![false; parents.len()];
     for i in top_down(document, &tops) {
         shown_above[i] = parents[i].is_some_and(|parent| listed[parent] || shown_above[parent]);
@@ -301,9 +239,7 @@ fn scene_roots(
     let mut roots = Vec::new();
     for node in scene.nodes.iter().map(Index::value) {
         if shown_above[node] || !std::mem::take(&mut listed[node]) {
-            sink.warn(format!(
-                "{file}: scene: node {node} is listed although it is shown already"
-            ));
+            sink.warn(format!("{file}: scene: node {node} is listed although it is shown already"));
         } else {
             roots.push(node);
         }
@@ -317,14 +253,7 @@ fn top_down(document: &Document<'_>, roots: &[usize]) -> Vec<usize> {
     let mut order = Vec::new();
     while let Some(i) = stack.pop() {
         order.push(i);
-        stack.extend(
-            document.root.nodes[i]
-                .children
-                .iter()
-                .flatten()
-                .rev()
-                .map(Index::value),
-        );
+        stack.extend(document.root.nodes[i].children.iter().flatten().rev().map(Index::value));
     }
     order
 }

@@ -31,11 +31,9 @@ pub(super) fn joints(
     for (i, joint) in skin.joints.iter().enumerate() {
         document.at(&document.root.nodes, joint, "node", &place)?;
         let root_from_joint = world[joint.value()].unwrap_or(DAffine3::IDENTITY);
-        let joint_from_bind = inverse_bind
-            .as_ref()
-            .map_or(DAffine3::IDENTITY, |matrices| {
-                DAffine3::from_mat4(DMat4::from_cols_array(&matrices.get::<16>(i)))
-            });
+        let joint_from_bind = inverse_bind.as_ref().map_or(DAffine3::IDENTITY, |matrices| {
+            DAffine3::from_mat4(DMat4::from_cols_array(&matrices.get::<16>(i)))
+        });
         joints.push(root_from_joint * joint_from_bind);
     }
     Ok(joints)
@@ -50,14 +48,8 @@ pub(super) fn pose(
     weights: &Elements<'_>,
 ) {
     for (i, &vertex) in vertices.iter().enumerate() {
-        let (joint, weight) = (
-            joints.get::<4>(vertex as usize),
-            weights.get::<4>(vertex as usize),
-        );
-        let mut sum = DAffine3 {
-            matrix3: DMat3::ZERO,
-            translation: DVec3::ZERO,
-        };
+        let (joint, weight) = (joints.get::<4>(vertex as usize), weights.get::<4>(vertex as usize));
+        let mut sum = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut total = 0.0;
         for (joint, weight) in joint.into_iter().zip(weight) {
             if let Some(matrix) = matrices.get(joint as usize).filter(|_| weight > 0.0) {

@@ -25,41 +25,19 @@ pub(super) struct Use<'a> {
 
 impl<'a> From<&'a Info> for Use<'a> {
     fn from(info: &'a Info) -> Self {
-        let transform = info
-            .extensions
-            .as_ref()
-            .and_then(|e| e.texture_transform.as_ref());
-        let uv_set = transform
-            .and_then(|t| t.tex_coord)
-            .unwrap_or(info.tex_coord);
-        Self {
-            index: &info.index,
-            transform,
-            uv_set,
-        }
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        let uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
+        Self { index: &info.index, transform, uv_set }
     }
 }
 
 /// The texture uses of a material that end up in the picture.
 pub(super) fn uses(material: &json::Material) -> Vec<Use<'_>> {
     let pbr = &material.pbr_metallic_roughness;
-    let old = material
-        .extensions
-        .as_ref()
-        .and_then(|e| e.pbr_specular_glossiness.as_ref());
-    let base = old.map_or(pbr.base_color_texture.as_ref(), |old| {
-        old.diffuse_texture.as_ref()
-    });
-    let rough = if old.is_some() {
-        None
-    } else {
-        pbr.metallic_roughness_texture.as_ref()
-    };
-    [base, rough, material.emissive_texture.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(Use::from)
-        .collect()
+    let old = material.extensions.as_ref().and_then(|e| e.pbr_specular_glossiness.as_ref());
+    let base = old.map_or(pbr.base_color_texture.as_ref(), |old| old.diffuse_texture.as_ref());
+    let rough = if old.is_some() { None } else { pbr.metallic_roughness_texture.as_ref() };
+    [base, rough, material.emissive_texture.as_ref()].into_iter().flatten().map(Use::from).collect()
 }
 
 /// Texture entities, spawned on first use; images are decoded before.
@@ -86,51 +64,25 @@ impl<'a> Textures<'a> {
                     continue;
                 };
                 let user = format!("texture {}", used.index.value());
-                let image =
-                    document.at(&root.images, &Index::new(source as u32), "image", &user)?;
-                wanted
-                    .entry(source)
-                    .or_insert_with(|| picture_of(document, source, image));
+                let image = document.at(&root.images, &Index::new(source as u32), "image", &user)?;
+                wanted.entry(source).or_insert_with(|| picture_of(document, source, image));
             }
         }
         let (indices, pictures): (Vec<usize>, Vec<Picture<'_>>) = wanted.into_iter().unzip();
         let texels = picture::decode_all(document.file, &pictures, sink);
-        Ok(Self {
-            document,
-            images: indices.into_iter().zip(texels).collect(),
-            spawned: BTreeMap::new(),
-        })
+        Ok(Self { document, images: indices.into_iter().zip(texels).collect(), spawned: BTreeMap::new() })
     }
 
-    pub(super) fn get(
-        &mut self,
-        info: &Info,
-        encoding: Encoding,
-        sink: &mut Sink<'_>,
-    ) -> Option<TextureUse> {
+    pub(super) fn get(&mut self, info: &Info, encoding: Encoding, sink: &mut Sink<'_>) -> Option<TextureUse> {
         let used = Use::from(info);
         let index = used.index.value();
         let texture = self.document.root.textures.get(index)?;
         let texels = self.images.get(&source_of(texture)?)?;
-        let entity = *self
-            .spawned
-            .entry((index, encoding == Encoding::Srgb))
-            .or_insert_with(|| {
-                let (wrap, filter) = sampling(self.document, texture, index, sink);
-                let name = texture
-                    .name
-                    .clone()
-                    .unwrap_or_else(|| format!("texture {index}"));
-                sink.spawn((
-                    Name::new(name),
-                    Texture {
-                        texels: Arc::clone(texels),
-                        encoding,
-                        wrap,
-                        filter,
-                    },
-                ))
-            });
+        let entity = *self.spawned.entry((index, encoding == Encoding::Srgb)).or_insert_with(|| {
+            let (wrap, filter) = sampling(self.document, texture, index, sink);
+            let name = texture.name.clone().unwrap_or_else(|| format!("texture {index}"));
+            sink.spawn((Name::new(name), Texture { texels: Arc::clone(texels), encoding, wrap, filter }))
+        });
         Some(TextureUse {
             texture: entity,
             uv_transform: used.transform.map_or(Affine2::IDENTITY, uv_transform),
@@ -140,17 +92,13 @@ impl<'a> Textures<'a> {
 
 /// The image of a texture: the core one, else that of an extension.
 fn source_of(texture: &json::Texture) -> Option<usize> {
-    let others = texture
-        .extensions
-        .as_ref()
-        .map(|extensions| &extensions.others);
+    let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
     let extension = |name: &str| {
         let source = others?.get(name)?.get("source")?.as_u64()?;
         u32::try_from(source).ok().map(|source| source as usize)
     };
     let core = Some(texture.source.value()).filter(|&source| source != u32::MAX as usize);
-    core.or_else(|| extension("EXT_texture_webp"))
-        .or_else(|| extension("KHR_texture_basisu"))
+    core.or_else(|| extension("EXT_texture_webp")).or_else(|| extension("KHR_texture_basisu"))
 }
 
 fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image) -> Picture<'d> {
@@ -166,11 +114,7 @@ fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image)
             .map_err(|_| ReadError::Data("lies outside its buffer")),
         (None, None) => Err(ReadError::Data("has neither a URI nor a buffer view")),
     };
-    Picture {
-        label,
-        bytes,
-        strict: true,
-    }
+    Picture { label, bytes, strict: true }
 }
 
 fn sampling(
@@ -182,13 +126,8 @@ fn sampling(
     let Some(sampler) = texture.sampler.as_ref() else {
         return Default::default();
     };
-    let Some(Sampler {
-        wrap_s,
-        wrap_t,
-        mag_filter,
-        min_filter,
-        ..
-    }) = document.root.samplers.get(sampler.value())
+    let Some(Sampler { wrap_s, wrap_t, mag_filter, min_filter, .. }) =
+        document.root.samplers.get(sampler.value())
     else {
         sink.warn(format!(
             "{}: texture {index} names sampler {}, which does not exist",
@@ -209,9 +148,7 @@ fn sampling(
     });
     let filter = match (mag_filter, min_filter) {
         (Some(Checked::Valid(MagFilter::Nearest)), _) => Filter::Nearest,
-        (None, Some(Checked::Valid(MinFilter::Nearest | MinFilter::NearestMipmapNearest))) => {
-            Filter::Nearest
-        }
+        (None, Some(Checked::Valid(MinFilter::Nearest | MinFilter::NearestMipmapNearest))) => Filter::Nearest,
         (Some(Checked::Invalid), _) | (_, Some(Checked::Invalid)) => {
             unknown = true;
             Filter::Bilinear
@@ -219,11 +156,7 @@ fn sampling(
         _ => Filter::Bilinear,
     };
     if unknown {
-        sink.warn(format!(
-            "{}: sampler {}: unknown wrap or filter mode",
-            document.file,
-            sampler.value()
-        ));
+        sink.warn(format!("{}: sampler {}: unknown wrap or filter mode", document.file, sampler.value()));
     }
     (wrap, filter)
 }
@@ -235,9 +168,5 @@ fn uv_transform(transform: &TextureTransform) -> Affine2 {
         -transform.rotation.0,
         Vec2::from(transform.offset.0),
     );
-    if affine.is_finite() {
-        affine
-    } else {
-        Affine2::IDENTITY
-    }
+    if affine.is_finite() { affine } else { Affine2::IDENTITY }
 }

@@ -23,30 +23,17 @@ impl<'a> Morphs<'a> {
     ) -> Result<Self, LoadError> {
         let mut targets = Vec::new();
         for (i, target) in primitive.targets.iter().flatten().enumerate() {
-            let weight = weights
-                .as_ref()
-                .and_then(|weights| weights.get(i))
-                .copied()
-                .unwrap_or(0.0);
+            let weight = weights.as_ref().and_then(|weights| weights.get(i)).copied().unwrap_or(0.0);
             if weight == 0.0 {
                 continue;
             }
             let open = |index: &Option<Index<json::Accessor>>| match index {
-                Some(index) => document
-                    .elements(index, &format!("{place}, morph target {i}"))
-                    .map(Some),
+                Some(index) => document.elements(index, &format!("{place}, morph target {i}")).map(Some),
                 None => Ok(None),
             };
             let pair = [open(&target.positions)?, open(&target.normals)?];
-            if pair
-                .iter()
-                .flatten()
-                .any(|elements| elements.count != count)
-            {
-                return Err(document.broken(
-                    place,
-                    format!("morph target {i} has another count of vertices"),
-                ));
+            if pair.iter().flatten().any(|elements| elements.count != count) {
+                return Err(document.broken(place, format!("morph target {i} has another count of vertices")));
             }
             targets.push((weight, pair));
         }
@@ -85,10 +72,7 @@ impl Used {
                 return Err(document.broken(place, "vertex count too large"));
             }
             leftover(document, mode, count, place, sink);
-            return Ok(Self {
-                vertices: (0..count as u32).collect(),
-                triangles,
-            });
+            return Ok(Self { vertices: (0..count as u32).collect(), triangles });
         };
         let indices = document.elements(index, &format!("{place}, indices"))?;
         if !indices.is_index_type() {
@@ -101,17 +85,12 @@ impl Used {
         for i in 0..indices.count {
             let vertex = indices.get_index(i);
             if vertex as usize >= count {
-                return Err(document.broken(
-                    &indices.place,
-                    format!("index out of range: vertex {vertex} of {count}"),
-                ));
+                return Err(document
+                    .broken(&indices.place, format!("index out of range: vertex {vertex} of {count}")));
             }
             renumbered.push(numbers.number(vertex, &mut vertices));
         }
-        Ok(Self {
-            vertices,
-            triangles: triangles_of(mode, renumbered.len(), |i| renumbered[i]),
-        })
+        Ok(Self { vertices, triangles: triangles_of(mode, renumbered.len(), |i| renumbered[i]) })
     }
 }
 
@@ -157,12 +136,8 @@ fn triangles_of(mode: Mode, count: usize, vertex: impl Fn(usize) -> u32) -> Vec<
     let corners = |[a, b, c]: [usize; 3]| [vertex(a), vertex(b), vertex(c)];
     let strip = count.saturating_sub(2);
     match mode {
-        Mode::TriangleStrip => (0..strip)
-            .map(|i| corners([i, i + 1 + i % 2, i + 2 - i % 2]))
-            .collect(),
+        Mode::TriangleStrip => (0..strip).map(|i| corners([i, i + 1 + i % 2, i + 2 - i % 2])).collect(),
         Mode::TriangleFan => (0..strip).map(|i| corners([i + 1, i + 2, 0])).collect(),
-        _ => (0..count / 3)
-            .map(|i| corners([3 * i, 3 * i + 1, 3 * i + 2]))
-            .collect(),
+        _ => (0..count / 3).map(|i| corners([3 * i, 3 * i + 1, 3 * i + 2])).collect(),
     }
 }

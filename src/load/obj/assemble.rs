@@ -19,26 +19,16 @@ pub(super) fn mesh(raw: &Raw) -> TriangleMesh {
     for (i, face) in raw.faces.iter().enumerate() {
         corners.clear();
         corners.extend(
-            raw.corners_of(i)
-                .iter()
-                .map(|corner| vertices.get(corner, normals.index(i, face.group, corner))),
+            raw.corners_of(i).iter().map(|corner| vertices.get(corner, normals.index(i, face.group, corner))),
         );
         points.clear();
         points.extend(
-            raw.corners_of(i)
-                .iter()
-                .map(|corner| raw.positions[corner.position as usize].as_dvec3()),
+            raw.corners_of(i).iter().map(|corner| raw.positions[corner.position as usize].as_dvec3()),
         );
         let triangles = polygon::triangulate(&points);
-        vertices
-            .mesh
-            .triangles
-            .extend(triangles.iter().map(|t| t.map(|corner| corners[corner])));
+        vertices.mesh.triangles.extend(triangles.iter().map(|t| t.map(|corner| corners[corner])));
         if several_materials {
-            vertices
-                .mesh
-                .slots
-                .resize(vertices.mesh.triangles.len(), face.material);
+            vertices.mesh.slots.resize(vertices.mesh.triangles.len(), face.material);
         }
     }
     vertices.mesh
@@ -56,12 +46,7 @@ struct Normals<'a> {
 
 impl<'a> Normals<'a> {
     fn new(raw: &'a Raw) -> Self {
-        let mut normals = Self {
-            raw,
-            made: Vec::new(),
-            smooth: HashMap::new(),
-            flat: Vec::new(),
-        };
+        let mut normals = Self { raw, made: Vec::new(), smooth: HashMap::new(), flat: Vec::new() };
         let bare = |corner: &&Corner| corner.normal == NONE;
         let any_given = raw.corners.iter().any(|corner| corner.normal != NONE);
         let any_smooth = raw
@@ -80,10 +65,8 @@ impl<'a> Normals<'a> {
                 normals.flat.push(NONE);
                 continue;
             }
-            let points: Vec<DVec3> = corners
-                .iter()
-                .map(|c| raw.positions[c.position as usize].as_dvec3())
-                .collect();
+            let points: Vec<DVec3> =
+                corners.iter().map(|c| raw.positions[c.position as usize].as_dvec3()).collect();
             let normal = polygon::newell(&points).normalize_or_zero();
             if face.group == 0 {
                 normals.flat.push(first_made + sums.len() as u32);
@@ -91,32 +74,19 @@ impl<'a> Normals<'a> {
                 continue;
             }
             normals.flat.push(NONE);
-            for (k, corner) in corners
-                .iter()
-                .enumerate()
-                .filter(|(_, corner)| bare(corner))
-            {
-                let made = *normals
-                    .smooth
-                    .entry((face.group, corner.position))
-                    .or_insert_with(|| {
-                        sums.push(DVec3::ZERO);
-                        first_made + sums.len() as u32 - 1
-                    });
+            for (k, corner) in corners.iter().enumerate().filter(|(_, corner)| bare(corner)) {
+                let made = *normals.smooth.entry((face.group, corner.position)).or_insert_with(|| {
+                    sums.push(DVec3::ZERO);
+                    first_made + sums.len() as u32 - 1
+                });
                 // Weighted by the angle at the corner, so that the cut into faces does not matter.
-                let [before, after] = [
-                    points[(k + points.len() - 1) % points.len()],
-                    points[(k + 1) % points.len()],
-                ];
+                let [before, after] =
+                    [points[(k + points.len() - 1) % points.len()], points[(k + 1) % points.len()]];
                 let angle = (before - points[k]).angle_between(after - points[k]);
-                sums[(made - first_made) as usize] +=
-                    normal * if angle.is_finite() { angle } else { 0.0 };
+                sums[(made - first_made) as usize] += normal * if angle.is_finite() { angle } else { 0.0 };
             }
         }
-        normals.made = sums
-            .into_iter()
-            .map(|sum| sum.normalize_or_zero().as_vec3())
-            .collect();
+        normals.made = sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect();
         normals
     }
 
@@ -132,10 +102,7 @@ impl<'a> Normals<'a> {
         if group == 0 {
             self.flat[face]
         } else {
-            self.smooth
-                .get(&(group, corner.position))
-                .copied()
-                .unwrap_or(NONE)
+            self.smooth.get(&(group, corner.position)).copied().unwrap_or(NONE)
         }
     }
 
@@ -163,13 +130,7 @@ struct Vertices<'a> {
 impl<'a> Vertices<'a> {
     fn new(raw: &'a Raw, normals: &'a Normals<'a>) -> Self {
         let last_made = vec![NONE; raw.positions.len()];
-        Self {
-            raw,
-            normals,
-            mesh: TriangleMesh::default(),
-            last_made,
-            links: Vec::new(),
-        }
+        Self { raw, normals, mesh: TriangleMesh::default(), last_made, links: Vec::new() }
     }
 
     fn get(&mut self, corner: &Corner, normal: u32) -> u32 {
@@ -188,21 +149,14 @@ impl<'a> Vertices<'a> {
             }
         }
         let made = self.links.len() as u32;
-        self.links
-            .push((corner.uv, normal, self.last_made[position]));
+        self.links.push((corner.uv, normal, self.last_made[position]));
         self.last_made[position] = made;
         self.mesh.positions.push(self.raw.positions[position]);
         if self.normals.any() {
             self.mesh.normals.push(self.normals.value(normal));
         }
         if !self.raw.uvs.is_empty() {
-            self.mesh.uvs.push(
-                self.raw
-                    .uvs
-                    .get(corner.uv as usize)
-                    .copied()
-                    .unwrap_or(Vec2::ZERO),
-            );
+            self.mesh.uvs.push(self.raw.uvs.get(corner.uv as usize).copied().unwrap_or(Vec2::ZERO));
         }
         if let Some(color) = self.raw.colors.get(position) {
             self.mesh.colors.push(color.extend(1.0));

@@ -7,18 +7,10 @@ use std::borrow::Cow;
 /// The text of a file, without byte order mark. Bytes that are not UTF-8 become replacement characters.
 pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, LoadError> {
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(LoadError::broken(
-            file,
-            "encoding",
-            "UTF-16 text; save it as UTF-8",
-        ));
+        return Err(LoadError::broken(file, "encoding", "UTF-16 text; save it as UTF-8"));
     }
     if bytes.contains(&0) {
-        return Err(LoadError::broken(
-            file,
-            "content",
-            "binary data, not text in UTF-8",
-        ));
+        return Err(LoadError::broken(file, "content", "binary data, not text in UTF-8"));
     }
     Ok(String::from_utf8_lossy(without_bom(bytes)))
 }
@@ -41,15 +33,10 @@ pub(super) fn for_each<E>(
     let mut joined: Option<(u32, String)> = None;
     let mut rest = text;
     while !rest.is_empty() {
-        let end = rest
-            .bytes()
-            .position(|byte| byte == b'\n' || byte == b'\r')
-            .unwrap_or(rest.len());
+        let end = rest.bytes().position(|byte| byte == b'\n' || byte == b'\r').unwrap_or(rest.len());
         let here = &rest[..end];
         rest = &rest[end..];
-        rest = rest
-            .strip_prefix("\r\n")
-            .unwrap_or_else(|| rest.get(1..).unwrap_or_default());
+        rest = rest.strip_prefix("\r\n").unwrap_or_else(|| rest.get(1..).unwrap_or_default());
         line = line.saturating_add(1);
         if let Some(part) = here.strip_suffix('\\')
             && !rest.is_empty()
@@ -67,23 +54,13 @@ pub(super) fn for_each<E>(
     Ok(())
 }
 
-fn one<E>(
-    line: u32,
-    text: &str,
-    visit: &mut impl FnMut(Statement<'_>) -> Result<(), E>,
-) -> Result<(), E> {
+fn one<E>(line: u32, text: &str, visit: &mut impl FnMut(Statement<'_>) -> Result<(), E>) -> Result<(), E> {
     let text = text.trim();
     if text.is_empty() || text.starts_with('#') {
         return Ok(());
     }
-    let (keyword, rest) = text
-        .split_once(|c: char| c.is_ascii_whitespace())
-        .unwrap_or((text, ""));
-    visit(Statement {
-        line,
-        keyword,
-        rest: rest.trim_start(),
-    })
+    let (keyword, rest) = text.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((text, ""));
+    visit(Statement { line, keyword, rest: rest.trim_start() })
 }
 
 #[cfg(test)]

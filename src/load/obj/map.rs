@@ -20,22 +20,13 @@ struct Map<'a> {
 
 impl<'a> Map<'a> {
     fn parse(statement: &'a str) -> Self {
-        let mut map = Self {
-            name: statement.trim(),
-            scale: Vec2::ONE,
-            offset: Vec2::ZERO,
-            clamp: false,
-        };
-        while let Some(option) = map
-            .name
-            .strip_prefix('-')
-            .and_then(|_| first_word(map.name))
-        {
+        let mut map = Self { name: statement.trim(), scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false };
+        while let Some(option) = map.name.strip_prefix('-').and_then(|_| first_word(map.name)) {
             let arguments = match option {
                 "-mm" => 2,
                 "-s" | "-o" | "-t" => 3,
-                "-blendu" | "-blendv" | "-boost" | "-bm" | "-cc" | "-clamp" | "-colorspace"
-                | "-imfchan" | "-texres" | "-type" => 1,
+                "-blendu" | "-blendv" | "-boost" | "-bm" | "-cc" | "-clamp" | "-colorspace" | "-imfchan"
+                | "-texres" | "-type" => 1,
                 _ => break,
             };
             let mut rest = map.name[option.len()..].trim_start();
@@ -72,11 +63,7 @@ impl<'a> Map<'a> {
     }
 
     fn wrap(&self) -> [Wrap; 2] {
-        [if self.clamp {
-            Wrap::Clamp
-        } else {
-            Wrap::Repeat
-        }; 2]
+        [if self.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2]
     }
 }
 
@@ -100,10 +87,8 @@ impl Textures {
         let mut pictures: BTreeMap<String, Picture<'_>> = BTreeMap::new();
         for material in materials {
             let emission = material.unknown_param.get("map_Ke");
-            for statement in [&material.diffuse_texture, &material.dissolve_texture]
-                .into_iter()
-                .flatten()
-                .chain(emission)
+            for statement in
+                [&material.diffuse_texture, &material.dissolve_texture].into_iter().flatten().chain(emission)
             {
                 let name = Map::parse(statement).name;
                 pictures.entry(name.to_owned()).or_insert_with(|| Picture {
@@ -115,31 +100,18 @@ impl Textures {
         }
         let (names, pictures): (Vec<String>, Vec<Picture<'_>>) = pictures.into_iter().unzip();
         let texels = picture::decode_all(file, &pictures, sink);
-        Self {
-            images: names.into_iter().zip(texels).collect(),
-            spawned: BTreeMap::new(),
-        }
+        Self { images: names.into_iter().zip(texels).collect(), spawned: BTreeMap::new() }
     }
 
     /// `map_Kd` with the alpha of `map_d`.
-    pub(super) fn color(
-        &mut self,
-        material: &tobj::Material,
-        sink: &mut Sink<'_>,
-    ) -> Option<TextureUse> {
+    pub(super) fn color(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
         let color = material.diffuse_texture.as_deref().map(Map::parse);
         let cover = material.dissolve_texture.as_deref().map(Map::parse);
         let main = color.as_ref().or(cover.as_ref())?.clone();
-        let key = |map: &Option<Map<'_>>| {
-            map.as_ref()
-                .map_or(String::new(), |map| map.name.to_owned())
-        };
+        let key = |map: &Option<Map<'_>>| map.as_ref().map_or(String::new(), |map| map.name.to_owned());
         let key = (key(&color), key(&cover), main.clamp);
-        let image = |map: &Option<Map<'_>>| {
-            map.as_ref()
-                .and_then(|map| self.images.get(map.name))
-                .map(Arc::clone)
-        };
+        let image =
+            |map: &Option<Map<'_>>| map.as_ref().and_then(|map| self.images.get(map.name)).map(Arc::clone);
         let texels = match (image(&color), image(&cover)) {
             (Some(color), None) => color,
             (color, Some(cover)) => Arc::new(with_alpha(color.as_deref(), &cover)),
@@ -148,19 +120,10 @@ impl Textures {
         Some(self.spawn(key, texels, &main, sink))
     }
 
-    pub(super) fn emission(
-        &mut self,
-        material: &tobj::Material,
-        sink: &mut Sink<'_>,
-    ) -> Option<TextureUse> {
+    pub(super) fn emission(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
         let map = Map::parse(material.unknown_param.get("map_Ke")?);
         let texels = Arc::clone(self.images.get(map.name)?);
-        Some(self.spawn(
-            (map.name.to_owned(), String::new(), map.clamp),
-            texels,
-            &map,
-            sink,
-        ))
+        Some(self.spawn((map.name.to_owned(), String::new(), map.clamp), texels, &map, sink))
     }
 
     fn spawn(
@@ -171,18 +134,11 @@ impl Textures {
         sink: &mut Sink<'_>,
     ) -> TextureUse {
         let texture = *self.spawned.entry(key).or_insert_with(|| {
-            let texture = Texture {
-                texels,
-                encoding: Encoding::Srgb,
-                wrap: map.wrap(),
-                filter: Filter::Bilinear,
-            };
+            let texture =
+                Texture { texels, encoding: Encoding::Srgb, wrap: map.wrap(), filter: Filter::Bilinear };
             sink.spawn((Name::new(map.name.to_owned()), texture))
         });
-        TextureUse {
-            texture,
-            uv_transform: map.uv_transform(),
-        }
+        TextureUse { texture, uv_transform: map.uv_transform() }
     }
 }
 
@@ -200,17 +156,12 @@ fn with_alpha(color: Option<&Texels>, cover: &Texels) -> Texels {
                 y * u64::from(cover.height) / u64::from(height),
             );
             let there = cover.texels[(there_y * u64::from(cover.width) + there_x) as usize];
-            let [r, g, b, _] = color.map_or([255; 4], |color| {
-                color.texels[(y * u64::from(width) + x) as usize]
-            });
+            let [r, g, b, _] =
+                color.map_or([255; 4], |color| color.texels[(y * u64::from(width) + x) as usize]);
             texels.push([r, g, b, if has_alpha { there[3] } else { there[0] }]);
         }
     }
-    Texels {
-        width,
-        height,
-        texels,
-    }
+    Texels { width, height, texels }
 }
 
 #[cfg(test)]
@@ -222,12 +173,7 @@ mod tests {
         let map = Map::parse("-blendu on -s 2 3 1 -o 0.5 0 -mm 0 1 -clamp on my tex.png");
         assert_eq!(
             map,
-            Map {
-                name: "my tex.png",
-                scale: Vec2::new(2., 3.),
-                offset: Vec2::new(0.5, 0.),
-                clamp: true
-            }
+            Map { name: "my tex.png", scale: Vec2::new(2., 3.), offset: Vec2::new(0.5, 0.), clamp: true }
         );
         assert_eq!(Map::parse("-odd name.png").name, "-odd name.png");
     }

@@ -63,9 +63,7 @@ pub(super) fn load(
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
-        sink.world
-            .entity_mut(root)
-            .insert(Instance { mesh, materials });
+        sink.world.entity_mut(root).insert(Instance { mesh, materials });
     }
     Ok(())
 }
@@ -82,9 +80,7 @@ fn material_entity(
         return all;
     }
     let Some(name) = name else {
-        sink.decide(format!(
-            "{file}: surfaces without a material are light grey"
-        ));
+        sink.decide(format!("{file}: surfaces without a material are light grey"));
         return sink.spawn((Name::new("default"), Material::default()));
     };
     if let Some(&known) = library.get(name) {
@@ -95,17 +91,10 @@ fn material_entity(
     }
     let short: String = name.chars().take(80).collect();
     let lower = name.to_lowercase();
-    if let Some((other, &entity)) = library
-        .iter()
-        .find(|(other, _)| other.to_lowercase() == lower)
-    {
-        sink.warn(format!(
-            "{file}: material `{short}` is defined as `{other}`"
-        ));
+    if let Some((other, &entity)) = library.iter().find(|(other, _)| other.to_lowercase() == lower) {
+        sink.warn(format!("{file}: material `{short}` is defined as `{other}`"));
         return entity;
     }
-    sink.warn(format!(
-        "{file}: material `{short}` is not defined; light grey"
-    ));
+    sink.warn(format!("{file}: material `{short}` is not defined; light grey"));
     sink.spawn((Name::new(short), Material::default()))
 }

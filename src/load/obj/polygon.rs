@@ -31,11 +31,7 @@ pub(super) fn triangulate(points: &[DVec3]) -> Vec<[usize; 3]> {
 pub(super) fn newell(points: &[DVec3]) -> DVec3 {
     let origin = points.first().copied().unwrap_or_default();
     let next = points.iter().cycle().skip(1);
-    points
-        .iter()
-        .zip(next)
-        .map(|(&a, &b)| (a - origin).cross(b - origin))
-        .sum()
+    points.iter().zip(next).map(|(&a, &b)| (a - origin).cross(b - origin)).sum()
 }
 
 /// The polygon in its own plane, counter-clockwise; None if it has no area.
@@ -43,18 +39,11 @@ fn project(points: &[DVec3]) -> Option<Vec<DVec2>> {
     let normal = newell(points).try_normalize()?;
     let (u, v) = normal.any_orthonormal_pair();
     let origin = points[0];
-    Some(
-        points
-            .iter()
-            .map(|&p| DVec2::new((p - origin).dot(u), (p - origin).dot(v)))
-            .collect(),
-    )
+    Some(points.iter().map(|&p| DVec2::new((p - origin).dot(u), (p - origin).dot(v))).collect())
 }
 
 fn fan(n: usize, start: usize) -> Vec<[usize; 3]> {
-    (1..n - 1)
-        .map(|i| [start, (start + i) % n, (start + i + 1) % n])
-        .collect()
+    (1..n - 1).map(|i| [start, (start + i) % n, (start + i + 1) % n]).collect()
 }
 
 /// Twice the signed area.
@@ -65,23 +54,10 @@ fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
 /// Whether no triangle of the fan is turned over.
 fn fan_covers(points: &[DVec2], start: usize) -> bool {
     let n = points.len();
-    let total: f64 = (1..n - 1)
-        .map(|i| {
-            turn(
-                points[start],
-                points[(start + i) % n],
-                points[(start + i + 1) % n],
-            )
-        })
-        .sum();
+    let total: f64 =
+        (1..n - 1).map(|i| turn(points[start], points[(start + i) % n], points[(start + i + 1) % n])).sum();
     let slack = -1e-12 * total.abs();
-    (1..n - 1).all(|i| {
-        turn(
-            points[start],
-            points[(start + i) % n],
-            points[(start + i + 1) % n],
-        ) >= slack
-    })
+    (1..n - 1).all(|i| turn(points[start], points[(start + i) % n], points[(start + i + 1) % n]) >= slack)
 }
 
 /// Cuts off ears until three corners are left. Quadratic in the corners, times the concave ones.
@@ -117,12 +93,7 @@ fn clip_ears(points: &[DVec2]) -> Vec<[usize; 3]> {
 }
 
 /// Whether another corner lies in the triangle. One at the same place as a tip does not count.
-fn holds_a_corner(
-    points: &[DVec2],
-    next: &[usize],
-    [a, b, c]: [usize; 3],
-    tests: &mut usize,
-) -> bool {
+fn holds_a_corner(points: &[DVec2], next: &[usize], [a, b, c]: [usize; 3], tests: &mut usize) -> bool {
     let [pa, pb, pc] = [a, b, c].map(|i| points[i]);
     let mut other = next[c];
     while other != a {
@@ -156,8 +127,8 @@ mod tests {
 
     #[test]
     fn a_concave_polygon_keeps_its_area_from_every_corner() {
-        let mut l = [[0., 0.], [2., 0.], [2., 1.], [1., 1.], [1., 2.], [0., 2.]]
-            .map(|[x, y]| DVec3::new(3.0, x, y));
+        let mut l =
+            [[0., 0.], [2., 0.], [2., 1.], [1., 1.], [1., 2.], [0., 2.]].map(|[x, y]| DVec3::new(3.0, x, y));
         for _ in 0..6 {
             l.rotate_left(1);
             assert!((area(&l) - 3.0).abs() < 1e-12);
@@ -169,9 +140,7 @@ mod tests {
         let mut comb = vec![DVec3::new(0., 0., 0.), DVec3::new(20., 0., 0.)];
         for tooth in (0..10).rev() {
             let x = 2.0 * f64::from(tooth);
-            comb.extend(
-                [[x + 2., 1.], [x + 1.5, 5.], [x + 1.0, 1.]].map(|[x, y]| DVec3::new(x, y, 0.)),
-            );
+            comb.extend([[x + 2., 1.], [x + 1.5, 5.], [x + 1.0, 1.]].map(|[x, y]| DVec3::new(x, y, 0.)));
         }
         comb.push(DVec3::new(0., 1., 0.));
         assert!((area(&comb) - newell(&comb).length() / 2.0).abs() < 1e-9);
@@ -179,8 +148,8 @@ mod tests {
 
     #[test]
     fn collinear_corners_lose_no_area() {
-        let square = [[0., 0.], [1., 0.], [2., 0.], [2., 2.], [1., 2.], [0., 2.]]
-            .map(|[x, y]| DVec3::new(x, y, 0.));
+        let square =
+            [[0., 0.], [1., 0.], [2., 0.], [2., 2.], [1., 2.], [0., 2.]].map(|[x, y]| DVec3::new(x, y, 0.));
         assert!((area(&square) - 4.0).abs() < 1e-12);
     }
 

@@ -52,8 +52,7 @@ pub(super) struct Raw {
 
 impl Raw {
     pub(super) fn read(&mut self, file: &str, statement: &Statement<'_>) -> Result<(), LoadError> {
-        let broken =
-            |problem: String| LoadError::broken(file, format!("line {}", statement.line), problem);
+        let broken = |problem: String| LoadError::broken(file, format!("line {}", statement.line), problem);
         match statement.keyword {
             "v" => self.read_position(statement.rest).map_err(broken)?,
             "vt" => {
@@ -91,14 +90,9 @@ impl Raw {
         if count < 3 {
             return Err(format!("vertex of {count} coordinates instead of 3"));
         }
-        self.positions
-            .push(Vec3::new(values[0], values[1], values[2]));
+        self.positions.push(Vec3::new(values[0], values[1], values[2]));
         // Six numbers end in a colour; seven have a weight before it.
-        let color = if count >= 6 {
-            Some(Vec3::from_slice(&values[count - 3..count]))
-        } else {
-            None
-        };
+        let color = if count >= 6 { Some(Vec3::from_slice(&values[count - 3..count])) } else { None };
         if color.is_some() && self.colors.is_empty() {
             self.colors.resize(self.positions.len() - 1, Vec3::ONE);
         }
@@ -110,50 +104,30 @@ impl Raw {
 
     fn read_face(&mut self, statement: &Statement<'_>) -> Result<(), String> {
         let first = self.corners.len();
-        for word in statement
-            .rest
-            .split_ascii_whitespace()
-            .take_while(|word| !word.starts_with('#'))
-        {
+        for word in statement.rest.split_ascii_whitespace().take_while(|word| !word.starts_with('#')) {
             let mut parts = word.split('/');
             let mut index = |count: usize, what: &str| resolve(parts.next(), count, what);
             let position = index(self.positions.len(), "vertex")?;
             let uv = index(self.uvs.len(), "texture coordinate (vt)")?;
             let normal = index(self.normals.len(), "normal (vn)")?;
             if position == NONE {
-                return Err(format!(
-                    "face corner `{}` without a vertex index",
-                    shorten(word)
-                ));
+                return Err(format!("face corner `{}` without a vertex index", shorten(word)));
             }
-            self.corners.push(Corner {
-                position,
-                uv,
-                normal,
-            });
+            self.corners.push(Corner { position, uv, normal });
         }
         if self.corners.len() - first < 3 {
             self.corners.truncate(first);
-            self.first_short_face = if self.short_faces == 0 {
-                statement.line
-            } else {
-                self.first_short_face
-            };
+            self.first_short_face =
+                if self.short_faces == 0 { statement.line } else { self.first_short_face };
             self.short_faces += 1;
             return Ok(());
         }
-        let first_corner =
-            u32::try_from(first).map_err(|_| "more than 2^32 face corners".to_owned())?;
+        let first_corner = u32::try_from(first).map_err(|_| "more than 2^32 face corners".to_owned())?;
         let material = match self.slot {
             Some(slot) => slot,
             None => self.current_slot()?,
         };
-        self.faces.push(Face {
-            first_corner,
-            line: statement.line,
-            material,
-            group: self.group,
-        });
+        self.faces.push(Face { first_corner, line: statement.line, material, group: self.group });
         Ok(())
     }
 
@@ -175,10 +149,7 @@ impl Raw {
     /// Corners of face `i`.
     pub(super) fn corners_of(&self, i: usize) -> &[Corner] {
         let start = self.faces[i].first_corner as usize;
-        let end = self
-            .faces
-            .get(i + 1)
-            .map_or(self.corners.len(), |next| next.first_corner as usize);
+        let end = self.faces.get(i + 1).map_or(self.corners.len(), |next| next.first_corner as usize);
         &self.corners[start..end]
     }
 
@@ -197,7 +168,9 @@ impl Raw {
             }
         }
         if forgotten > 0 {
-            sink.warn(format!("{file}: {forgotten} indices of normals or texture coordinates ignored: the file has none"));
+            sink.warn(format!(
+                "{file}: {forgotten} indices of normals or texture coordinates ignored: the file has none"
+            ));
         }
     }
 
@@ -213,27 +186,15 @@ impl Raw {
                 ];
                 let position = self.positions.get(corner.position as usize);
                 if position.is_some_and(|p| p.is_nan()) {
-                    let problem = format!(
-                        "uses vertex {}, which is not a finite number",
-                        corner.position + 1
-                    );
-                    return Err(LoadError::broken(
-                        file,
-                        format!("line {}", face.line),
-                        problem,
-                    ));
+                    let problem =
+                        format!("uses vertex {}, which is not a finite number", corner.position + 1);
+                    return Err(LoadError::broken(file, format!("line {}", face.line), problem));
                 }
                 for (index, count, what) in lists {
                     if index != NONE && index as usize >= count {
-                        let problem = format!(
-                            "index out of range: {what} {} of {count}",
-                            u64::from(index) + 1
-                        );
-                        return Err(LoadError::broken(
-                            file,
-                            format!("line {}", face.line),
-                            problem,
-                        ));
+                        let problem =
+                            format!("index out of range: {what} {} of {count}", u64::from(index) + 1);
+                        return Err(LoadError::broken(file, format!("line {}", face.line), problem));
                     }
                 }
             }
@@ -244,9 +205,7 @@ impl Raw {
     pub(super) fn warn(&self, file: &str, sink: &mut Sink<'_>) {
         if self.short_faces > 0 {
             let (count, line) = (self.short_faces, self.first_short_face);
-            sink.warn(format!(
-                "{file}: line {line}: {count} faces with fewer than three corners skipped"
-            ));
+            sink.warn(format!("{file}: line {line}: {count} faces with fewer than three corners skipped"));
         }
         if !self.unknown.is_empty() {
             let names: Vec<&str> = self.unknown.iter().map(String::as_str).collect();
@@ -262,13 +221,8 @@ impl Raw {
 fn numbers<const N: usize>(text: &str) -> Result<([f32; N], usize), String> {
     let mut values = [0.0; N];
     let mut count = 0;
-    for word in text
-        .split_ascii_whitespace()
-        .take_while(|word| !word.starts_with('#'))
-        .take(N)
-    {
-        values[count] =
-            number(word).ok_or_else(|| format!("`{}` is not a number", shorten(word)))?;
+    for word in text.split_ascii_whitespace().take_while(|word| !word.starts_with('#')).take(N) {
+        values[count] = number(word).ok_or_else(|| format!("`{}` is not a number", shorten(word)))?;
         count += 1;
     }
     Ok((values, count))
@@ -295,30 +249,18 @@ fn resolve(word: Option<&str>, count: usize, what: &str) -> Result<u32, String> 
     if word.is_empty() {
         return Ok(NONE);
     }
-    let out_of_range = || {
-        format!(
-            "index out of range: {what} {}, {count} so far",
-            shorten(word)
-        )
-    };
+    let out_of_range = || format!("index out of range: {what} {}, {count} so far", shorten(word));
     match word.parse::<i64>() {
         Ok(0) => Err(format!("index 0: {what} indices begin at 1")),
-        Ok(index) if index > 0 => u32::try_from(index - 1)
-            .ok()
-            .filter(|&i| i != NONE)
-            .ok_or_else(out_of_range),
-        Ok(index) => {
-            let from_end = usize::try_from(index.unsigned_abs())
-                .ok()
-                .and_then(|back| count.checked_sub(back));
-            from_end
-                .and_then(|i| u32::try_from(i).ok())
-                .ok_or_else(out_of_range)
+        Ok(index) if index > 0 => {
+            u32::try_from(index - 1).ok().filter(|&i| i != NONE).ok_or_else(out_of_range)
         }
-        Err(error) => Err(format!(
-            "{what} index `{}` is not a number in range: {error}",
-            shorten(word)
-        )),
+        Ok(index) => {
+            let from_end =
+                usize::try_from(index.unsigned_abs()).ok().and_then(|back| count.checked_sub(back));
+            from_end.and_then(|i| u32::try_from(i).ok()).ok_or_else(out_of_range)
+        }
+        Err(error) => Err(format!("{what} index `{}` is not a number in range: {error}", shorten(word))),
     }
 }
 

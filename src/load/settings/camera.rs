@@ -29,27 +29,21 @@ pub(super) fn spawn(
     let eye = check.point("position", camera.position);
     let target = check.point("target", camera.target);
     let up = check.point("up", camera.up.unwrap_or([0.0, 1.0, 0.0]));
-    check.that((target - eye).length() > 0.0, || {
-        "position and target are the same point".to_owned()
-    });
+    check.that((target - eye).length() > 0.0, || "position and target are the same point".to_owned());
     check.that(up.length() > 0.0, || "up must not be zero".to_owned());
     let projection = match (camera.vertical_fov, camera.orthographic_height) {
         (Some(_), Some(_)) => {
-            check.that(false, || {
-                "has both vertical_fov and orthographic_height: give one".to_owned()
-            });
+            check.that(false, || "has both vertical_fov and orthographic_height: give one".to_owned());
             Camera::default().projection
         }
-        (None, Some(height)) => Projection::Orthographic {
-            height: check.length("orthographic_height", height),
-        },
+        (None, Some(height)) => {
+            Projection::Orthographic { height: check.length("orthographic_height", height) }
+        }
         (Some(degrees), None) => {
             check.that(degrees > 0.0 && degrees < 180.0, || {
                 format!("vertical_fov must be between 0 and 180 degrees, not {degrees}")
             });
-            Projection::Perspective {
-                vertical_fov: degrees.to_radians(),
-            }
+            Projection::Perspective { vertical_fov: degrees.to_radians() }
         }
         (None, None) => Camera::default().projection,
     };
@@ -57,11 +51,7 @@ pub(super) fn spawn(
         return Err(settings.broken(table, "[camera]", problem));
     }
     let name = "camera";
-    let entity = sink.spawn((
-        Name::new(name),
-        Transform::looking_at(eye, target, up),
-        Camera { projection },
-    ));
+    let entity = sink.spawn((Name::new(name), Transform::looking_at(eye, target, up), Camera { projection }));
     sink.report.cameras.insert(0, (name.to_owned(), entity));
     Ok(entity)
 }

@@ -107,24 +107,11 @@ pub(super) fn spawn(
     Ok(())
 }
 
-fn convert(
-    table: &LightTable,
-    check: &mut Check,
-) -> (&'static str, Transform, Light, Option<bool>) {
+fn convert(table: &LightTable, check: &mut Check) -> (&'static str, Transform, Light, Option<bool>) {
     match table {
-        LightTable::Parallelogram {
-            corner,
-            edge_u,
-            edge_v,
-            radiance,
-            two_sided,
-            visible,
-        } => {
+        LightTable::Parallelogram { corner, edge_u, edge_v, radiance, two_sided, visible } => {
             let corner = check.point("corner", *corner);
-            let (u, v) = (
-                check.point("edge_u", *edge_u),
-                check.point("edge_v", *edge_v),
-            );
+            let (u, v) = (check.point("edge_u", *edge_u), check.point("edge_v", *edge_v));
             check.that(u.cross(v).length() > 0.0, || {
                 "has no area: edge_u and edge_v are parallel or zero".to_owned()
             });
@@ -138,62 +125,28 @@ fn convert(
                 radiance: corners.map(|corner| check.spectrum("radiance", corner)),
                 two_sided: *two_sided,
             };
-            (
-                "parallelogram",
-                Transform::from_translation(corner + 0.5 * (u + v)),
-                light,
-                *visible,
-            )
+            ("parallelogram", Transform::from_translation(corner + 0.5 * (u + v)), light, *visible)
         }
-        LightTable::Disk {
-            center,
-            normal,
-            radius,
-            radiance,
-            two_sided,
-            visible,
-        } => {
+        LightTable::Disk { center, normal, radius, radiance, two_sided, visible } => {
             let light = Light::Disk {
                 radius: check.length("radius", *radius),
                 radiance: check.spectrum("radiance", *radiance),
                 two_sided: *two_sided,
             };
             let center = check.point("center", *center);
-            (
-                "disk",
-                along(check, center, "normal", *normal),
-                light,
-                *visible,
-            )
+            ("disk", along(check, center, "normal", *normal), light, *visible)
         }
-        LightTable::Sphere {
-            center,
-            radius,
-            radiance,
-            visible,
-        } => {
+        LightTable::Sphere { center, radius, radiance, visible } => {
             let light = Light::Sphere {
                 radius: check.length("radius", *radius),
                 radiance: check.spectrum("radiance", *radiance),
             };
-            (
-                "sphere",
-                Transform::from_translation(check.point("center", *center)),
-                light,
-                *visible,
-            )
+            ("sphere", Transform::from_translation(check.point("center", *center)), light, *visible)
         }
-        LightTable::Segment {
-            from,
-            to,
-            strength,
-            emission,
-        } => {
+        LightTable::Segment { from, to, strength, emission } => {
             let (from, to) = (check.point("from", *from), check.point("to", *to));
             let half = 0.5 * (to - from);
-            check.that(half.length() > 0.0, || {
-                "has no length: from and to are the same point".to_owned()
-            });
+            check.that(half.length() > 0.0, || "has no length: from and to are the same point".to_owned());
             let axis = half.try_normalize().unwrap_or(DVec3::X);
             let (y, z) = axis.any_orthonormal_pair();
             let ends = match strength {
@@ -212,32 +165,14 @@ fn convert(
             transform.0.matrix3 = DMat3::from_cols(axis, y, z);
             ("segment", transform, light, None)
         }
-        LightTable::Point {
-            position,
-            intensity,
-        } => {
-            let light = Light::Point {
-                intensity: check.spectrum("intensity", *intensity),
-            };
-            (
-                "point",
-                Transform::from_translation(check.point("position", *position)),
-                light,
-                None,
-            )
+        LightTable::Point { position, intensity } => {
+            let light = Light::Point { intensity: check.spectrum("intensity", *intensity) };
+            ("point", Transform::from_translation(check.point("position", *position)), light, None)
         }
-        LightTable::Spot {
-            position,
-            target,
-            intensity,
-            inner_angle,
-            outer_angle,
-        } => {
+        LightTable::Spot { position, target, intensity, inner_angle, outer_angle } => {
             let position = check.point("position", *position);
             let target = check.point("target", *target);
-            check.that(position != target, || {
-                "position and target are the same point".to_owned()
-            });
+            check.that(position != target, || "position and target are the same point".to_owned());
             check.that(*inner_angle >= 0.0 && inner_angle < outer_angle && *outer_angle <= 90.0, || {
                 format!("angles must be 0 <= inner_angle < outer_angle <= 90 degrees, not {inner_angle} and {outer_angle}")
             });
@@ -246,18 +181,9 @@ fn convert(
                 inner_angle: inner_angle.to_radians(),
                 outer_angle: outer_angle.to_radians(),
             };
-            (
-                "spot",
-                Transform::looking_at(position, target, DVec3::Y),
-                light,
-                None,
-            )
+            ("spot", Transform::looking_at(position, target, DVec3::Y), light, None)
         }
-        LightTable::Directional {
-            direction,
-            irradiance,
-            angle,
-        } => {
+        LightTable::Directional { direction, irradiance, angle } => {
             check.that((0.0..=180.0).contains(angle), || {
                 format!("angle must be within 0 to 180 degrees, not {angle}")
             });
@@ -265,21 +191,11 @@ fn convert(
                 irradiance: check.spectrum("irradiance", *irradiance),
                 angle: angle.to_radians(),
             };
-            (
-                "directional",
-                along(check, DVec3::ZERO, "direction", *direction),
-                light,
-                None,
-            )
+            ("directional", along(check, DVec3::ZERO, "direction", *direction), light, None)
         }
         LightTable::Environment { radiance } => {
             let radiance: Vec3 = check.spectrum("radiance", *radiance);
-            (
-                "environment",
-                Transform::default(),
-                Light::Environment { radiance },
-                None,
-            )
+            ("environment", Transform::default(), Light::Environment { radiance }, None)
         }
     }
 }
@@ -287,12 +203,6 @@ fn convert(
 /// At `place`, local −Z along `direction`.
 fn along(check: &mut Check, place: DVec3, key: &str, direction: [f64; 3]) -> Transform {
     let direction = check.point(key, direction);
-    check.that(direction.length() > 0.0, || {
-        format!("{key} must not be zero")
-    });
-    Transform::looking_at(
-        place,
-        place + direction.normalize_or(DVec3::NEG_Z),
-        DVec3::Y,
-    )
+    check.that(direction.length() > 0.0, || format!("{key} must not be zero"));
+    Transform::looking_at(place, place + direction.normalize_or(DVec3::NEG_Z), DVec3::Y)
 }

@@ -5,9 +5,7 @@ use crate::load::error::LoadError;
 use crate::load::picture::{self, Picture};
 use crate::load::report::Sink;
 use crate::load::source::IMAGE_LIMIT;
-use crate::scene::{
-    Alpha, Encoding, Filter, Glass, Glossy, Material, Texels, Texture, TextureUse, Wrap,
-};
+use crate::scene::{Alpha, Encoding, Filter, Glass, Glossy, Material, Texels, Texture, TextureUse, Wrap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec2, Vec3};
@@ -34,11 +32,7 @@ impl Materials {
 
     /// Names that no model uses.
     pub(in crate::load) fn unused(&self) -> Vec<&str> {
-        self.named
-            .iter()
-            .filter(|(_, (_, used))| !used)
-            .map(|(name, _)| name.as_str())
-            .collect()
+        self.named.iter().filter(|(_, (_, used))| !used).map(|(name, _)| name.as_str()).collect()
     }
 
     /// Adds those of another settings file, which win.
@@ -81,10 +75,8 @@ enum FilterName {
 
 pub(super) fn spawn_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<Materials, LoadError> {
     let tables = &settings.tables.material;
-    let names: Vec<&str> = tables
-        .values()
-        .filter_map(|table| table.get_ref().base_color_texture.as_deref())
-        .collect();
+    let names: Vec<&str> =
+        tables.values().filter_map(|table| table.get_ref().base_color_texture.as_deref()).collect();
     let pictures: Vec<Picture<'_>> = names
         .iter()
         .map(|name| Picture {
@@ -102,11 +94,7 @@ pub(super) fn spawn_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<Mate
         if let Some(problem) = check.problem {
             return Err(settings.broken(table, &format!("[material.{name}]"), problem));
         }
-        let texture = table
-            .get_ref()
-            .base_color_texture
-            .as_deref()
-            .and_then(|name| images.get(name));
+        let texture = table.get_ref().base_color_texture.as_deref().and_then(|name| images.get(name));
         if let Some(texels) = texture {
             material.base_color_texture = Some(spawn_texture(table.get_ref(), name, texels, sink));
         }
@@ -116,80 +104,46 @@ pub(super) fn spawn_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<Mate
     Ok(materials)
 }
 
-fn spawn_texture(
-    table: &MaterialTable,
-    name: &str,
-    texels: &Arc<Texels>,
-    sink: &mut Sink<'_>,
-) -> TextureUse {
+fn spawn_texture(table: &MaterialTable, name: &str, texels: &Arc<Texels>, sink: &mut Sink<'_>) -> TextureUse {
     let filter = match table.filter {
         Some(FilterName::Nearest) => Filter::Nearest,
         Some(FilterName::Bilinear) | None => Filter::Bilinear,
     };
-    let texture = Texture {
-        texels: Arc::clone(texels),
-        encoding: Encoding::Srgb,
-        wrap: [Wrap::Repeat; 2],
-        filter,
-    };
+    let texture =
+        Texture { texels: Arc::clone(texels), encoding: Encoding::Srgb, wrap: [Wrap::Repeat; 2], filter };
     let texture = sink.spawn((Name::new(format!("texture of {name}")), texture));
     let scale = table.uv_scale.map_or(Vec2::ONE, Vec2::from);
-    TextureUse {
-        texture,
-        uv_transform: Affine2::from_scale(scale),
-    }
+    TextureUse { texture, uv_transform: Affine2::from_scale(scale) }
 }
 
 fn convert(table: &MaterialTable, check: &mut Check) -> Material {
     let special = table.mirror.is_some() || table.glass.is_some() || table.emission.is_some();
     let grey = if special { 0.0 } else { 0.8 };
-    let default = if table.base_color_texture.is_some() {
-        1.0
-    } else {
-        grey
-    };
+    let default = if table.base_color_texture.is_some() { 1.0 } else { grey };
     let is_ggx = table.metallic.is_some() || table.roughness.is_some();
     let is_phong = table.specular.is_some() || table.exponent.is_some();
     check.that(!(is_ggx && is_phong), || {
         "has both metallic or roughness and specular or exponent: choose one pair".to_owned()
     });
-    let mut color = |key: &str, value: Option<[f32; 3]>, default: f32| {
-        check.color(key, value.unwrap_or([default; 3]))
-    };
+    let mut color =
+        |key: &str, value: Option<[f32; 3]>, default: f32| check.color(key, value.unwrap_or([default; 3]));
     let base_color = color("base_color", table.base_color, default);
     let specular = color("specular", table.specular, 0.2);
     let mirror = color("mirror", table.mirror, 0.0);
-    let tint = color(
-        "tint",
-        table.glass.as_ref().and_then(|glass| glass.tint),
-        1.0,
-    );
-    let ior = table
-        .glass
-        .as_ref()
-        .and_then(|glass| glass.ior)
-        .unwrap_or(1.5);
-    check.that(ior.is_finite() && ior >= 1.0, || {
-        format!("glass: ior must be at least 1, not {ior}")
-    });
+    let tint = color("tint", table.glass.as_ref().and_then(|glass| glass.tint), 1.0);
+    let ior = table.glass.as_ref().and_then(|glass| glass.ior).unwrap_or(1.5);
+    check.that(ior.is_finite() && ior >= 1.0, || format!("glass: ior must be at least 1, not {ior}"));
     let exponent = table.exponent.unwrap_or(100.0);
     check.that(exponent.is_finite() && exponent >= 0.0, || {
         format!("exponent must be 0 or more, not {exponent}")
     });
     let phong = if is_phong { specular } else { Vec3::ZERO };
-    check.that(
-        (base_color + mirror + phong).max_element() <= 1.0 + 1e-4,
-        || {
-            "base_color, specular and mirror together exceed 1: the surface would create light"
-                .to_owned()
-        },
-    );
-    check.that(
-        table
-            .uv_scale
-            .is_none_or(|scale| Vec2::from(scale).is_finite()),
-        || "uv_scale must be finite".to_owned(),
-    );
+    check.that((base_color + mirror + phong).max_element() <= 1.0 + 1e-4, || {
+        "base_color, specular and mirror together exceed 1: the surface would create light".to_owned()
+    });
+    check.that(table.uv_scale.is_none_or(|scale| Vec2::from(scale).is_finite()), || {
+        "uv_scale must be finite".to_owned()
+    });
     let opacity = check.unit("opacity", table.opacity.unwrap_or(1.0));
     Material {
         base_color,
@@ -209,11 +163,7 @@ fn convert(table: &MaterialTable, check: &mut Check) -> Material {
         glass: table.glass.as_ref().map(|_| Glass { ior, tint }),
         emission: check.spectrum("emission", table.emission.unwrap_or([0.0; 3])),
         emission_texture: None,
-        alpha: if opacity < 1.0 {
-            Alpha::Blend
-        } else {
-            Alpha::Opaque
-        },
+        alpha: if opacity < 1.0 { Alpha::Blend } else { Alpha::Opaque },
         opacity,
         double_sided: table.double_sided.unwrap_or(false),
         unlit: false,

@@ -149,18 +149,9 @@ impl Settings {
             .to_owned();
         let tables = toml::from_str(&text).map_err(|error: toml::de::Error| {
             let line = error.span().map_or(1, |span| line_of(&text, span.start));
-            LoadError::broken(
-                file,
-                format!("line {line}"),
-                error.message().replace('\n', ", "),
-            )
+            LoadError::broken(file, format!("line {line}"), error.message().replace('\n', ", "))
         })?;
-        Ok(Self {
-            file: file.to_owned(),
-            folder,
-            text,
-            tables,
-        })
+        Ok(Self { file: file.to_owned(), folder, text, tables })
     }
 
     /// Whether it is a scene of its own.
@@ -168,12 +159,7 @@ impl Settings {
         !self.tables.model.is_empty()
     }
 
-    fn broken<T>(
-        &self,
-        table: &Spanned<T>,
-        what: &str,
-        problem: impl std::fmt::Display,
-    ) -> LoadError {
+    fn broken<T>(&self, table: &Spanned<T>, what: &str, problem: impl std::fmt::Display) -> LoadError {
         let line = line_of(&self.text, table.span().start);
         LoadError::broken(&self.file, format!("line {line}, {what}"), problem)
     }
@@ -185,11 +171,7 @@ impl Settings {
 
     /// The models to load, checked, with their materials found among `materials`.
     pub(super) fn models(&self, materials: &mut Materials) -> Result<Vec<Model>, LoadError> {
-        self.tables
-            .model
-            .iter()
-            .map(|table| model::resolve(self, table, materials))
-            .collect()
+        self.tables.model.iter().map(|table| model::resolve(self, table, materials)).collect()
     }
 
     /// Spawns the camera and hands over the render options.
@@ -206,11 +188,7 @@ impl Settings {
 
     /// Spawns the lights.
     pub(super) fn spawn_lights(&self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
-        self.tables
-            .light
-            .iter()
-            .enumerate()
-            .try_for_each(|(i, table)| light::spawn(self, i, table, sink))
+        self.tables.light.iter().enumerate().try_for_each(|(i, table)| light::spawn(self, i, table, sink))
     }
 
     fn check_render(&self, table: &Spanned<SidecarRender>) -> Result<(), LoadError> {
@@ -218,16 +196,10 @@ impl Settings {
         let wrong = |problem: &str| Err(self.broken(table, "[render]", problem));
         match render {
             _ if render.spp == Some(0) => wrong("spp must be at least 1"),
-            _ if render
-                .exposure
-                .is_some_and(|ev| !ev.is_finite() || ev.abs() > 100.0) =>
-            {
+            _ if render.exposure.is_some_and(|ev| !ev.is_finite() || ev.abs() > 100.0) => {
                 wrong("exposure must be within -100 to 100 EV")
             }
-            _ if render
-                .resolution
-                .is_some_and(|[w, h]| w.min(h) < 1 || w.max(h) > 65536) =>
-            {
+            _ if render.resolution.is_some_and(|[w, h]| w.min(h) < 1 || w.max(h) > 65536) => {
                 wrong("resolution must be within 1 to 65536 pixels each way")
             }
             _ => Ok(()),
@@ -237,11 +209,7 @@ impl Settings {
 
 /// Line of a byte offset, from 1.
 fn line_of(text: &str, offset: usize) -> usize {
-    text.bytes()
-        .take(offset)
-        .filter(|&byte| byte == b'\n')
-        .count()
-        + 1
+    text.bytes().take(offset).filter(|&byte| byte == b'\n').count() + 1
 }
 
 /// Checks one value of a table after the other; the first problem wins.
@@ -260,10 +228,9 @@ impl Check {
     /// A point or vector, finite.
     fn point(&mut self, key: &str, value: [f64; 3]) -> DVec3 {
         let value = DVec3::from(value);
-        self.that(
-            value.is_finite() && value.abs().max_element() <= 1e15,
-            || format!("{key} must be finite and within 1e15"),
-        );
+        self.that(value.is_finite() && value.abs().max_element() <= 1e15, || {
+            format!("{key} must be finite and within 1e15")
+        });
         value
     }
 
@@ -279,25 +246,20 @@ impl Check {
     /// A colour in 0..=1.
     fn color(&mut self, key: &str, value: [f32; 3]) -> Vec3 {
         let value = Vec3::from(value);
-        self.that(
-            value.min_element() >= 0.0 && value.max_element() <= 1.0,
-            || format!("{key} must be within 0 to 1"),
-        );
+        self.that(value.min_element() >= 0.0 && value.max_element() <= 1.0, || {
+            format!("{key} must be within 0 to 1")
+        });
         value
     }
 
     fn unit(&mut self, key: &str, value: f32) -> f32 {
-        self.that((0.0..=1.0).contains(&value), || {
-            format!("{key} must be within 0 to 1, not {value}")
-        });
+        self.that((0.0..=1.0).contains(&value), || format!("{key} must be within 0 to 1, not {value}"));
         value
     }
 
     /// A length above 0.
     fn length(&mut self, key: &str, value: f32) -> f32 {
-        self.that(value.is_finite() && value > 0.0, || {
-            format!("{key} must be above 0, not {value}")
-        });
+        self.that(value.is_finite() && value > 0.0, || format!("{key} must be above 0, not {value}"));
         value
     }
 }

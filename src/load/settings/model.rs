@@ -56,56 +56,35 @@ pub(super) fn resolve(
     let material = match &model.material {
         None => None,
         Some(name) => Some(
-            materials
-                .replacement(name)
-                .ok_or_else(|| wrong(format!("no [material.{name}] in this file")))?,
+            materials.replacement(name).ok_or_else(|| wrong(format!("no [material.{name}] in this file")))?,
         ),
     };
     // Whoever writes a scene file may point anywhere, unlike what a downloaded model names.
     let (file, folder, read) = match &settings.folder {
         Folder::Disk(folder) => {
             let path = folder.join(&model.file);
-            (
-                path.to_string_lossy().into_owned(),
-                Folder::of(&path),
-                read_file(&path, SCENE_LIMIT),
-            )
+            (path.to_string_lossy().into_owned(), Folder::of(&path), read_file(&path, SCENE_LIMIT))
         }
         Folder::BuiltIn => {
             let asset = builtin::asset(&model.file).map(Bytes::Borrowed);
-            (
-                model.file.clone(),
-                Folder::BuiltIn,
-                asset.ok_or(crate::load::error::ReadError::Missing),
-            )
+            (model.file.clone(), Folder::BuiltIn, asset.ok_or(crate::load::error::ReadError::Missing))
         }
     };
     let bytes = read.map_err(|why| wrong(format!("`{}`: {why}", model.file)))?;
-    if Path::new(&model.file)
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
-    {
+    if Path::new(&model.file).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
         return Err(wrong(format!(
             "`{}`: a settings file cannot be a model; name .gltf, .glb or .obj",
             model.file
         )));
     }
-    Ok(Model {
-        file,
-        folder,
-        bytes,
-        transform,
-        material,
-    })
+    Ok(Model { file, folder, bytes, transform, material })
 }
 
 fn placement(model: &ModelTable, check: &mut Check) -> Transform {
     if let Some(rows) = model.matrix {
-        let parts =
-            model.translation.is_some() || model.rotation.is_some() || model.scale.is_some();
-        check.that(!parts, || {
-            "has both matrix and translation, rotation or scale: choose one way".to_owned()
-        });
+        let parts = model.translation.is_some() || model.rotation.is_some() || model.scale.is_some();
+        check
+            .that(!parts, || "has both matrix and translation, rotation or scale: choose one way".to_owned());
         let matrix = DMat4::from_cols_array_2d(&rows).transpose();
         check.that(matrix.is_finite() && matrix.row(3) == DVec4::W, || {
             "matrix must be finite with the last row [0, 0, 0, 1]".to_owned()
@@ -113,18 +92,12 @@ fn placement(model: &ModelTable, check: &mut Check) -> Transform {
         return Transform(DAffine3::from_mat4(matrix));
     }
     let translation = check.point("translation", model.translation.unwrap_or([0.0; 3]));
-    let [x, y, z] = check
-        .point("rotation", model.rotation.unwrap_or([0.0; 3]))
-        .to_array()
-        .map(f64::to_radians);
+    let [x, y, z] =
+        check.point("rotation", model.rotation.unwrap_or([0.0; 3])).to_array().map(f64::to_radians);
     let scale = match model.scale {
         None => DVec3::ONE,
         Some(Scale::Same(all)) => check.point("scale", [all; 3]),
         Some(Scale::Each(each)) => check.point("scale", each),
     };
-    Transform::from_parts(
-        translation,
-        DQuat::from_euler(EulerRot::ZYX, z, y, x),
-        scale,
-    )
+    Transform::from_parts(translation, DQuat::from_euler(EulerRot::ZYX, z, y, x), scale)
 }
