@@ -286,18 +286,18 @@ fn zero_direction_components_miss_nothing() {
     }
 }
 
-/// pbrt-v4's BadCases: a triangle of area exactly 0.
+/// pbrt-v4's `BadCases`: a triangle of area exactly 0.
 #[test]
 fn a_triangle_without_area_is_never_hit() {
     let triangle = [
-        Vec3::new(-1113.454_59, -79.049_614, -56.243_190_8),
-        Vec3::new(-1113.454_59, -87.092_269_9, -56.243_190_8),
-        Vec3::new(-1113.454_59, -79.209_014_9, -56.243_190_8),
+        Vec3::new(-1113.4546, -79.049614, -56.24319),
+        Vec3::new(-1113.4546, -87.09227, -56.24319),
+        Vec3::new(-1113.4546, -79.209015, -56.24319),
     ];
     let ray = Ray {
-        origin: Vec3::new(-1_081.479_25, 99.999_954_2, 87.770_111_1),
-        direction: Vec3::new(-32.107_299_8, -183.355_865, -144.607_635),
-        t_max: 0.999_9,
+        origin: Vec3::new(-1081.4792, 99.999954, 87.77011),
+        direction: Vec3::new(-32.1073, -183.35587, -144.60764),
+        t_max: 0.9999,
     };
     assert_eq!(Blas::build(&[triangle]).closest_hit(&ray), None);
 }

@@ -200,7 +200,7 @@ fn pictures_agree_with_the_converged_references() {
     let peers = shared.join("peers/renderers");
     // 32 samples per pixel leave noise of about half of this.
     for (name, mode, rmse) in [
-        ("cornell", "direct", 3e-3),
+        ("cornell", "direct", 1.3e-3),
         ("softshadows", "direct", 7e-3),
         ("cornell", "path5", 1.8e-2),
         ("softshadows", "path5", 1.4e-2),

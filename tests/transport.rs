@@ -128,17 +128,17 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
     }
 }
 
-/// glTF's dielectric is no furnace: its diffuse base does not know how much the coat reflects toward the
-/// eye. These are the figures of its specification (appendix B), held so that a change is seen.
+/// Base and coat together: the base gets what the coat lets through, at the flatter of both directions.
 #[test]
-fn the_gltf_dielectric_gains_what_its_specification_says() {
+fn a_gltf_dielectric_never_sends_back_more_than_it_gets() {
     for roughness in [0.1, 0.5, 1.0] {
         let glossy = Glossy::Ggx { metallic: 0.0, roughness, texture: None };
         let material = Material { glossy, ..Material::lambert(Vec3::ONE) };
-        let sums = ANGLES.map(|angle| plane_under_a_white_sky(material.clone(), angle, 256).mean);
-        println!("white dielectric of roughness {roughness}: {sums:.3?}");
-        assert!(sums[..3].iter().all(|s| (0.95..1.06).contains(s)), "{sums:?}");
-        assert!(sums.iter().all(|s| *s < 2.0), "{sums:?}");
+        let sums = ANGLES.map(|angle| plane_under_a_white_sky(material.clone(), angle, 256));
+        let means = sums.map(|s| s.mean);
+        println!("white dielectric of roughness {roughness}: {means:.3?}");
+        assert!(sums.iter().all(|s| s.mean <= 1.0 + 4.5 * s.sigma), "{means:?}");
+        assert!(means[..3].iter().all(|m| *m > 0.85), "{means:?}");
     }
 }
 

@@ -138,8 +138,10 @@ impl Bsdf {
                 let fresnel = schlick(f0, v_dot_h);
                 let d = ggx_distribution(self.normal.cross(h).length_squared(), alpha);
                 let visibility = smith_visibility(n_dot_l, n_dot_v, alpha);
-                // A dielectric's interface takes its share from what reaches the diffuse base.
-                let passed = 1.0 - schlick(Vec3::splat(0.04), v_dot_h).x;
+                // A dielectric's interface takes its share from what reaches the diffuse base. glTF weighs
+                // by the cosine to the half vector, which at grazing angles sends back up to 1.7 times
+                // the light; by the flatter of the two directions it is reciprocal and gains nothing.
+                let passed = 1.0 - schlick(Vec3::splat(0.04), n_dot_l.min(n_dot_v)).x;
                 [lambert * passed, fresnel * (d * visibility * n_dot_l)]
             }
         }

@@ -511,7 +511,7 @@ impl ApplicationHandler<Wake> for Viewer {
             }
             WindowEvent::Focused(false) => self.leave(),
             WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
-                self.key(event_loop, &event, is_synthetic)
+                self.key(event_loop, &event, is_synthetic);
             }
             WindowEvent::MouseInput { state, button: MouseButton::Right, .. } => {
                 self.set_drag(state == ElementState::Pressed);

@@ -147,8 +147,10 @@ fn sampling(
         }
     });
     let filter = match (mag_filter, min_filter) {
-        (Some(Checked::Valid(MagFilter::Nearest)), _) => Filter::Nearest,
-        (None, Some(Checked::Valid(MinFilter::Nearest | MinFilter::NearestMipmapNearest))) => Filter::Nearest,
+        (Some(Checked::Valid(MagFilter::Nearest)), _)
+        | (None, Some(Checked::Valid(MinFilter::Nearest | MinFilter::NearestMipmapNearest))) => {
+            Filter::Nearest
+        }
         (Some(Checked::Invalid), _) | (_, Some(Checked::Invalid)) => {
             unknown = true;
             Filter::Bilinear

@@ -52,7 +52,7 @@ fn open(file: &str, folder: &Folder, library: &str, sink: &mut Sink<'_>) -> Vec<
         match folder.read_or_neighbour(name, TEXT_LIMIT) {
             Ok(bytes) => found.push((name.to_owned(), bytes)),
             Err(why) => {
-                sink.warn(format!("{file}: material library `{name}`: {why}; its materials are light grey"))
+                sink.warn(format!("{file}: material library `{name}`: {why}; its materials are light grey"));
             }
         }
     }
