@@ -149,7 +149,12 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
         interrupt,
     };
     let bar = Bar::new(output.quiet);
-    let result = render(&job, |opened| tell(&opened.report), |progress| bar.update(progress));
+    let say = |report: &LoadReport| {
+        if !output.quiet {
+            tell(report);
+        }
+    };
+    let result = render(&job, |opened| say(&opened.report), |progress| bar.update(progress));
     bar.clear();
     match result {
         Ok(summary) => finish(&summary, output),
