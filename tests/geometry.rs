@@ -414,6 +414,8 @@ fn the_checker_finds_each_defect() {
     let mut broken = good.clone();
     broken.nodes[inner].first = 1 << 30;
     assert!(matches!(broken.check(&boxes), Err(Defect::Dangling { .. })));
+    let shallow = Bvh { depth: 1, ..good.clone() };
+    assert!(matches!(shallow.check(&boxes), Err(Defect::TooDeep { .. })));
     let mut broken = good;
     broken.nodes[leaf].count = 0;
     broken.nodes[leaf].first = 0;

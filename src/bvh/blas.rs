@@ -51,28 +51,28 @@ impl Blas {
     /// The nearest hit; of equally near ones that of the lowest triangle index.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_accepted(ray, 0, None, |_| true)
+        self.closest_accepted(&Probe::new(ray, &self.bounds()), ray.t_max, 0, None, |_| true)
     }
 
     /// Whether there is any hit.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.any_accepted(ray, 0, |_| true)
+        self.any_accepted(&Probe::new(ray, &self.bounds()), ray.t_max, 0, |_| true)
     }
 
     /// The better of `best` and the nearest hit that `accept` takes, reported as of `instance`.
     #[inline]
     pub(super) fn closest_accepted(
         &self,
-        ray: &Ray,
+        probe: &Probe,
+        t_max: f32,
         instance: u32,
         mut best: Option<Hit>,
         accept: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
-        let probe = Probe::new(ray, &self.bounds());
-        let t_max = best.map_or(ray.t_max, |b| b.t);
+        let t_max = best.map_or(t_max, |b| b.t);
         // Never broken off, so the control flow tells nothing.
-        let _ = self.bvh.traverse::<()>(&probe, t_max, |leaf, mut t_max| {
+        let _ = self.bvh.traverse::<()>(probe, t_max, |leaf, mut t_max| {
             for i in leaf {
                 if let Some(hit) = probe.triangle(&self.triangles[i], t_max) {
                     let hit = Hit { t: hit.t, u: hit.u, v: hit.v, triangle: self.bvh.prims[i], instance };
@@ -89,10 +89,15 @@ impl Blas {
 
     /// Whether there is a hit that `accept` takes.
     #[inline]
-    pub(super) fn any_accepted(&self, ray: &Ray, instance: u32, accept: impl Fn(&Hit) -> bool) -> bool {
-        let probe = Probe::new(ray, &self.bounds());
+    pub(super) fn any_accepted(
+        &self,
+        probe: &Probe,
+        t_max: f32,
+        instance: u32,
+        accept: impl Fn(&Hit) -> bool,
+    ) -> bool {
         self.bvh
-            .traverse(&probe, ray.t_max, |leaf, t_max| {
+            .traverse(probe, t_max, |leaf, t_max| {
                 for i in leaf {
                     if let Some(hit) = probe.triangle(&self.triangles[i], t_max) {
                         let hit = Hit { t: hit.t, u: hit.u, v: hit.v, triangle: self.bvh.prims[i], instance };

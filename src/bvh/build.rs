@@ -26,6 +26,8 @@ pub struct Bvh {
     pub nodes: Vec<Node>,
     /// Indices of the boxes it was built from, in the order of the leaves.
     pub prims: Vec<u32>,
+    /// Most inner nodes on a path from the root: what a traversal stack must hold.
+    pub depth: usize,
 }
 
 /// Beyond this many boxes a leaf is always split.
@@ -66,7 +68,8 @@ impl Bvh {
         let mut nodes = vec![unused; 2 * prims.len() - 1];
         let (root, below) = nodes.split_at_mut(1);
         split(&mut root[0], below, 1, &mut prims, 0, 0);
-        Self { nodes: compact(&nodes), prims: prims.iter().map(|p| p.index).collect() }
+        let (nodes, depth) = compact(&nodes);
+        Self { nodes, prims: prims.iter().map(|p| p.index).collect(), depth }
     }
 
     /// The box around everything; empty if there is nothing.
@@ -219,22 +222,24 @@ fn partition(prims: &mut [Prim], is_left: impl Fn(&Prim) -> bool) -> usize {
     middle
 }
 
-/// Closes the gaps that leaves of several boxes left, in depth-first order.
-fn compact(sparse: &[Node]) -> Vec<Node> {
+/// Closes the gaps that leaves of several boxes left, in depth-first order; returns the depth too.
+fn compact(sparse: &[Node]) -> (Vec<Node>, usize) {
     let mut dense = Vec::with_capacity(sparse.len());
     dense.push(sparse[0]);
-    let mut stack = vec![0];
-    while let Some(parent) = stack.pop() {
+    let mut deepest = 0;
+    let mut stack = vec![(0, 1)];
+    while let Some((parent, depth)) = stack.pop() {
         let Node { first, count, .. } = dense[parent];
         if count == 0 {
+            deepest = deepest.max(depth);
             let pair = dense.len();
             dense.extend_from_slice(&sparse[first as usize..first as usize + 2]);
             dense[parent].first = pair as u32;
-            stack.extend([pair + 1, pair]);
+            stack.extend([(pair + 1, depth + 1), (pair, depth + 1)]);
         }
     }
     dense.shrink_to_fit();
-    dense
+    (dense, deepest)
 }
 
 /// What [`Bvh::check`] can find.
@@ -291,7 +296,8 @@ impl Bvh {
         while let Some((index, depth)) = stack.pop() {
             let node = self.nodes[index as usize];
             let aabb = Aabb { min: node.min, max: node.max };
-            if depth > MAX_DEPTH {
+            // Inner nodes above this one; a stack holds one entry for each.
+            if depth > MAX_DEPTH.min(self.depth) {
                 return Err(Defect::TooDeep { node: index, depth });
             }
             let dangling = Defect::Dangling { node: index };

@@ -52,17 +52,16 @@ impl Placement {
         &self.local_from_world
     }
 
-    /// The same ray in local space. The direction is not normalised, so t stays what it is.
+    /// The same ray made ready in local space; `None` if that is no other than the world's. The
+    /// direction is not normalised, so t stays what it is.
     #[inline]
-    fn local(&self, ray: &Ray) -> Ray {
-        if self.identity {
-            return *ray;
-        }
-        Ray {
+    fn local(&self, ray: &Ray) -> Option<Probe> {
+        let local = |ray: &Ray| Ray {
             origin: self.local_from_world.transform_point3(ray.origin.as_dvec3()).as_vec3(),
             direction: self.local_from_world.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
             t_max: ray.t_max,
-        }
+        };
+        (!self.identity).then(|| Probe::new(&local(ray), &self.blas.bounds()))
     }
 
     /// The box of the placed corners, rounded outward.
@@ -144,7 +143,9 @@ impl Tlas {
         let _ = self.bvh.traverse::<()>(&probe, ray.t_max, |leaf, t_max| {
             for &i in &self.bvh.prims[leaf] {
                 let placement = &self.placements[i as usize];
-                best = placement.blas.closest_accepted(&placement.local(ray), i, best, &accept);
+                let local = placement.local(ray);
+                let probe = local.as_ref().unwrap_or(&probe);
+                best = placement.blas.closest_accepted(probe, ray.t_max, i, best, &accept);
             }
             ControlFlow::Continue(best.map_or(t_max, |b: Hit| b.t))
         });
@@ -160,7 +161,9 @@ impl Tlas {
             .traverse(&probe, ray.t_max, |leaf, t_max| {
                 for &i in &self.bvh.prims[leaf] {
                     let placement = &self.placements[i as usize];
-                    if placement.blas.any_accepted(&placement.local(ray), i, &accept) {
+                    let local = placement.local(ray);
+                    let probe = local.as_ref().unwrap_or(&probe);
+                    if placement.blas.any_accepted(probe, ray.t_max, i, &accept) {
                         return ControlFlow::Break(());
                     }
                 }

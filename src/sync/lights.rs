@@ -3,8 +3,10 @@
 use super::{Redone, RenderOrigin};
 use crate::scene::color::luminance;
 use crate::scene::{GlobalTransform, Light, Material, TriangleMesh, Visible};
-use crate::trace::light::{FlatLight, MeshLight, Shape, ShapeLight, triangle_area};
+use crate::trace::light::FlatLight;
+use crate::trace::mesh_light::{MeshLight, triangle_area};
 use crate::trace::scene::InstanceData;
+use crate::trace::shape_light::{Shape, ShapeLight};
 use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, Vec3};

@@ -5,6 +5,7 @@
 use super::TraceScene;
 use super::scene::Surface;
 use super::surface::Interaction;
+use super::warp::{cosine_hemisphere, spherical};
 use crate::scene::color::luminance;
 use crate::scene::{Glass, Glossy};
 use glam::{Vec2, Vec3};
@@ -270,19 +271,6 @@ impl Bsdf {
 /// `direction` mirrored at `normal`; both leave the surface.
 fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
     (normal * (2.0 * normal.dot(direction)) - direction).normalize()
-}
-
-/// Cosine-distributed around +Z.
-#[must_use]
-pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
-    spherical((1.0 - u.x).sqrt(), u.y)
-}
-
-/// The unit vector at this cosine to +Z and this fraction of a turn.
-fn spherical(cos: f32, turn: f32) -> Vec3 {
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let (y, x) = (turn * 2.0 * PI).sin_cos();
-    Vec3::new(sin * x, sin * y, cos)
 }
 
 /// Factor that makes the Blinn-Phong lobe reflect its specular colour at normal incidence:

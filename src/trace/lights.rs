@@ -1,6 +1,7 @@
 //! All lights together: which to sample, and which a ray runs into.
 
-use super::light::{FlatLight, ShapeHit, ShapeLight};
+use super::light::FlatLight;
+use super::shape_light::{ShapeHit, ShapeLight};
 use crate::bvh::{Aabb, Bvh, Probe, Ray};
 use bevy_ecs::prelude::*;
 use std::ops::ControlFlow;
@@ -43,6 +44,8 @@ pub struct LightHit<'a> {
 
 /// Up to this many lights are all sampled where the eye looks; more are sampled by chance.
 pub const ALL_LIGHTS: usize = 8;
+/// Up to this many solid lights are not worth a hierarchy.
+const FEW_SHAPES: usize = 4;
 
 impl Lights {
     /// `meshes` names the light of each emissive (instance, slot); `scene_radius` is for the choice only.
@@ -166,7 +169,14 @@ impl Lights {
         ray: &Ray,
         mut visit: impl FnMut(u32, &'a ShapeLight, f32) -> ControlFlow<B, f32>,
     ) -> ControlFlow<B> {
-        if self.shape_lights.is_empty() {
+        // A few are tried faster than searched.
+        if self.shape_lights.len() <= FEW_SHAPES {
+            let mut t_max = ray.t_max;
+            for &light in &self.shape_lights {
+                if let FlatLight::Shape(shape) = &self.lights[light as usize] {
+                    t_max = visit(light, shape, t_max)?;
+                }
+            }
             return ControlFlow::Continue(());
         }
         let probe = Probe::new(ray, &self.shapes.bounds());

@@ -9,13 +9,16 @@ pub mod film;
 pub mod integrator;
 pub mod light;
 pub mod lights;
+pub mod mesh_light;
 pub mod noise;
 pub mod pass;
 pub mod sampler;
 pub mod scene;
 pub mod settings;
+pub mod shape_light;
 pub mod surface;
 pub mod texture;
+pub mod warp;
 
 pub use camera::Viewpoint;
 pub use film::Film;

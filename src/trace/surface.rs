@@ -3,6 +3,7 @@
 use super::TraceScene;
 use super::bsdf::Bsdf;
 use super::scene::{InstanceData, interpolate};
+use super::warp::offset;
 use crate::bvh::{Hit, Ray};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
@@ -99,20 +100,4 @@ impl Interaction {
         }
         material.emission * scene.texture(surface.emission_texture, self.uv).truncate()
     }
-}
-
-/// `point` moved along `normal` until it is clear of the error box around itself.
-#[must_use]
-pub fn offset(point: Vec3, error: Vec3, normal: Vec3) -> Vec3 {
-    let moved = point + normal * error.dot(normal.abs());
-    let outward = |p: f32, n: f32| {
-        if n > 0.0 {
-            p.next_up()
-        } else if n < 0.0 {
-            p.next_down()
-        } else {
-            p
-        }
-    };
-    Vec3::new(outward(moved.x, normal.x), outward(moved.y, normal.y), outward(moved.z, normal.z))
 }
