@@ -1,7 +1,7 @@
 //! The hierarchy against brute force, and the hard cases of intersection. No tolerance anywhere.
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Hit, Placement, Probe, Ray, Tlas};
+use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Hit, Node, Placement, Probe, Ray, Tlas};
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -414,12 +414,27 @@ fn the_checker_finds_each_defect() {
     let mut broken = good.clone();
     broken.nodes[inner].first = 1 << 30;
     assert!(matches!(broken.check(&boxes), Err(Defect::Dangling { .. })));
-    let shallow = Bvh { depth: 1, ..good.clone() };
-    assert!(matches!(shallow.check(&boxes), Err(Defect::TooDeep { .. })));
     let mut broken = good;
     broken.nodes[leaf].count = 0;
     broken.nodes[leaf].first = 0;
     assert!(matches!(broken.check(&boxes), Err(Defect::Dangling { .. })), "no way back to the root");
+}
+
+#[test]
+fn the_checker_finds_a_path_longer_than_a_traversal_stack() {
+    // A chain: node 2 i is inner, node 2 i − 1 a leaf of one box beside it.
+    let chain = |levels: u32| {
+        let (min, max) = (Vec3::ZERO, Vec3::ONE);
+        let mut nodes = vec![Node { min, first: 1, max, count: 0 }];
+        for level in 1..=levels {
+            nodes.push(Node { min, first: level - 1, max, count: 1 });
+            nodes.push(Node { min, first: 2 * level + 1, max, count: 0 });
+        }
+        *nodes.last_mut().unwrap() = Node { min, first: levels, max, count: 1 };
+        Bvh { nodes, prims: (0..=levels).collect() }.check(&vec![Aabb { min, max }; levels as usize + 1])
+    };
+    assert_eq!(chain(20), Ok(()));
+    assert!(matches!(chain(200), Err(Defect::TooDeep { .. })));
 }
 
 #[test]

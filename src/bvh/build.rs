@@ -26,14 +26,12 @@ pub struct Bvh {
     pub nodes: Vec<Node>,
     /// Indices of the boxes it was built from, in the order of the leaves.
     pub prims: Vec<u32>,
-    /// Most inner nodes on a path from the root: what a traversal stack must hold.
-    pub depth: usize,
 }
 
 /// Beyond this many boxes a leaf is always split.
 const MAX_LEAF: usize = 4;
 /// Levels split by the heuristic; below them the list is halved, which ends after 32 levels more.
-const SAH_LEVELS: usize = 64;
+const SAH_LEVELS: usize = 32;
 /// No path from the root has more inner nodes: the bound of every traversal stack.
 pub const MAX_DEPTH: usize = SAH_LEVELS + 32;
 const BINS: usize = 16;
@@ -68,8 +66,7 @@ impl Bvh {
         let mut nodes = vec![unused; 2 * prims.len() - 1];
         let (root, below) = nodes.split_at_mut(1);
         split(&mut root[0], below, 1, &mut prims, 0, 0);
-        let (nodes, depth) = compact(&nodes);
-        Self { nodes, prims: prims.iter().map(|p| p.index).collect(), depth }
+        Self { nodes: compact(&nodes), prims: prims.iter().map(|p| p.index).collect() }
     }
 
     /// The box around everything; empty if there is nothing.
@@ -222,24 +219,22 @@ fn partition(prims: &mut [Prim], is_left: impl Fn(&Prim) -> bool) -> usize {
     middle
 }
 
-/// Closes the gaps that leaves of several boxes left, in depth-first order; returns the depth too.
-fn compact(sparse: &[Node]) -> (Vec<Node>, usize) {
+/// Closes the gaps that leaves of several boxes left, in depth-first order.
+fn compact(sparse: &[Node]) -> Vec<Node> {
     let mut dense = Vec::with_capacity(sparse.len());
     dense.push(sparse[0]);
-    let mut deepest = 0;
-    let mut stack = vec![(0, 1)];
-    while let Some((parent, depth)) = stack.pop() {
+    let mut stack = vec![0];
+    while let Some(parent) = stack.pop() {
         let Node { first, count, .. } = dense[parent];
         if count == 0 {
-            deepest = deepest.max(depth);
             let pair = dense.len();
             dense.extend_from_slice(&sparse[first as usize..first as usize + 2]);
             dense[parent].first = pair as u32;
-            stack.extend([(pair + 1, depth + 1), (pair, depth + 1)]);
+            stack.extend([pair + 1, pair]);
         }
     }
     dense.shrink_to_fit();
-    (dense, deepest)
+    dense
 }
 
 /// What [`Bvh::check`] can find.
@@ -297,7 +292,7 @@ impl Bvh {
             let node = self.nodes[index as usize];
             let aabb = Aabb { min: node.min, max: node.max };
             // Inner nodes above this one; a stack holds one entry for each.
-            if depth > MAX_DEPTH.min(self.depth) {
+            if depth > MAX_DEPTH {
                 return Err(Defect::TooDeep { node: index, depth });
             }
             let dangling = Defect::Dangling { node: index };

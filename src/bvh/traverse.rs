@@ -4,9 +4,6 @@ use super::build::MAX_DEPTH;
 use super::{Bvh, Probe};
 use std::ops::{ControlFlow, Range};
 
-/// Few hierarchies are deeper.
-const COMMON_DEPTH: usize = 32;
-
 impl Bvh {
     /// Visits, near before far, each leaf whose box the ray enters at or before `t_max`.
     ///
@@ -14,21 +11,6 @@ impl Bvh {
     /// `Continue(t_max)`, shortened if it found something, or `Break` to stop.
     #[inline]
     pub fn traverse<B>(
-        &self,
-        probe: &Probe,
-        t_max: f32,
-        visit: impl FnMut(Range<usize>, f32) -> ControlFlow<B, f32>,
-    ) -> ControlFlow<B> {
-        // Clearing a stack for the worst case costs as much as a visit of several nodes.
-        if self.depth <= COMMON_DEPTH {
-            self.traverse_within::<B, COMMON_DEPTH>(probe, t_max, visit)
-        } else {
-            self.traverse_within::<B, MAX_DEPTH>(probe, t_max, visit)
-        }
-    }
-
-    #[inline]
-    fn traverse_within<B, const DEPTH: usize>(
         &self,
         probe: &Probe,
         mut t_max: f32,
@@ -39,7 +21,7 @@ impl Bvh {
             return ControlFlow::Continue(());
         }
         let mut node = root;
-        let mut stack = [(0, 0.0); DEPTH];
+        let mut stack = [(0, 0.0); MAX_DEPTH];
         let mut waiting = 0;
         loop {
             if node.count > 0 {
