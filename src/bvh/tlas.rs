@@ -172,20 +172,6 @@ impl Tlas {
             .is_break()
     }
 
-    /// The nearest hit of each of `rays`, into `hits` of the same length.
-    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.closest_hit(ray);
-        }
-    }
-
-    /// Whether each of `rays` hits anything, into `blocked` of the same length.
-    pub fn any_hits(&self, rays: &[Ray], blocked: &mut [bool]) {
-        for (ray, blocked) in rays.iter().zip(blocked) {
-            *blocked = self.any_hit(ray);
-        }
-    }
-
     fn probe(&self, ray: &Ray) -> Probe {
         Probe::with_slack(ray, &self.bvh.bounds(), self.slack)
     }
