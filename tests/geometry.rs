@@ -268,7 +268,7 @@ fn zero_direction_components_miss_nothing() {
         for negative_zero in [false, true] {
             let direction =
                 if negative_zero { direction.map(|c| if c == 0.0 { -0.0 } else { c }) } else { direction };
-            // Every seventh of the 21³ origins: brute force over 1,800 triangles is slow.
+            // Every 35th of the 21³ origins, others for each direction: brute force over all triangles is slow.
             for o in (d % 7..9261).step_by(7 * 5) {
                 let origin = Vec3::new((o % 21) as f32, (o / 21 % 21) as f32, (o / 441) as f32) * 0.5 - 1.0;
                 let ray = Ray::new(origin, direction);
@@ -337,7 +337,7 @@ fn instances_agree_with_each_alone() {
         })
         .collect();
     let tlas = Tlas::build(placements.clone());
-    for i in 0..20_000 {
+    for i in 0..2_100 {
         let ray = Ray::new(rng.vec() * 12.0, rng.direction());
         let expected = placements
             .iter()
@@ -349,9 +349,6 @@ fn instances_agree_with_each_alone() {
             .reduce(|a, b| if b.beats(&a) { b } else { a });
         assert_eq!(tlas.closest_hit(&ray), expected, "ray {i}");
         assert_eq!(tlas.any_hit(&ray), expected.is_some(), "any-hit, ray {i}");
-        if i % 100 == 0 && i > 2000 {
-            break;
-        }
     }
 }
 

@@ -86,8 +86,8 @@ fn mask(lights: &Lights, viewpoint: &Viewpoint, size: UVec2) -> Vec<bool> {
     (0..h)
         .flat_map(|y| (0..w).map(move |x| (x, y)))
         .map(|(x, y)| {
-            !(-3..=3).any(|dy: i32| {
-                (-3..=3).any(|dx: i32| {
+            !(-2..=2).any(|dy: i32| {
+                (-2..=2).any(|dx: i32| {
                     let (x, y) = (x + dx, y + dy);
                     (0..w).contains(&x) && (0..h).contains(&y) && lit[(y * w + x) as usize]
                 })
