@@ -5,16 +5,25 @@
 //! bounds of all rounding errors follow from the ray and the size of what it is tested against.
 
 pub mod aabb;
+mod batch;
 pub mod blas;
 pub mod build;
+mod leaves;
+mod packet;
 pub mod probe;
 pub mod ray;
+pub mod simd;
+mod single;
 pub mod tlas;
 pub mod traverse;
+pub mod triangle;
+pub mod wide;
 
 pub use aabb::Aabb;
 pub use blas::Blas;
 pub use build::{Bvh, Defect, Node};
 pub use probe::Probe;
 pub use ray::{Hit, Ray};
+pub use simd::Isa;
 pub use tlas::{Placement, Tlas};
+pub use wide::WideBvh;

@@ -1,7 +1,7 @@
 //! A ray made ready for boxes and triangles.
 
 use super::{Aabb, Ray};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// A [`Ray`] prepared for everything inside one bounding box.
 ///
@@ -14,32 +14,29 @@ use glam::{DVec3, Vec3};
 /// sections 3.1 to 3.3.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    origin: Vec3,
-    direction: Vec3,
-    /// Axis of the largest direction component last, the others in the order that keeps winding.
-    axes: [usize; 3],
-    shear: Vec3,
+    pub(super) origin: Vec3,
+    pub(super) direction: Vec3,
+    /// Axis of the largest direction component last.
+    pub(super) axes: [usize; 3],
+    /// Along the other axes, how far the ray goes while it goes 1 along the last; its t there.
+    pub(super) shear: Vec3,
     /// Reciprocal direction; ±`f32::MAX` where a component is 0, so that 0 · ∞ cannot happen.
-    inverse: Vec3,
-    near_origin: Vec3,
-    far_origin: Vec3,
-}
-
-/// Intersection of a [`Probe`] with a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriangleHit {
-    /// Ray parameter.
-    pub t: f32,
-    /// Barycentric weight of the second corner.
-    pub u: f32,
-    /// Barycentric weight of the third corner.
-    pub v: f32,
+    pub(super) inverse: Vec3,
+    pub(super) near_origin: Vec3,
+    pub(super) far_origin: Vec3,
+    /// Triangles have to be tested in double precision.
+    pub(super) extreme: bool,
 }
 
 /// 5 units from the triangle test, 3 from the box test's own operations, rounded up.
-const SLACK: f32 = 12.0 / (1 << 24) as f32;
-/// A hit nearer than this part of the farthest corner's distance is measured again in double precision.
-const CANCELLATION: f32 = 0.25;
+pub(super) const SLACK: f32 = 12.0 / (1 << 24) as f32;
+/// Beyond this distance, or if all is nearer than its reciprocal, products in single precision might
+/// overflow or vanish.
+const EXTREME: f32 = (1u64 << 40) as f32;
+
+pub(super) fn is_extreme(reach: f32) -> bool {
+    !(1.0 / EXTREME..EXTREME).contains(&reach)
+}
 
 impl Probe {
     /// Prepares `ray` for boxes and triangles inside `bounds`.
@@ -53,10 +50,7 @@ impl Probe {
     pub(super) fn with_slack(ray: &Ray, bounds: &Aabb, factor: f32) -> Self {
         let direction = ray.direction;
         let z = direction.abs().max_position();
-        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
-        if direction[z] < 0.0 {
-            (x, y) = (y, x);
-        }
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let shear = Vec3::new(direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]);
 
         let reach = (bounds.min - ray.origin).abs().max((bounds.max - ray.origin).abs());
@@ -73,7 +67,15 @@ impl Probe {
             inverse,
             near_origin: ray.origin + outward * slack,
             far_origin: ray.origin - outward * slack,
+            extreme: is_extreme(reach.max_element()),
         }
+    }
+
+    /// Bit 0 is set if the direction's x is negative (-0 too), bit 1 for y, bit 2 for z.
+    #[inline(always)]
+    #[must_use]
+    pub fn octant(&self) -> usize {
+        self.direction.is_negative_bitmask() as usize
     }
 
     /// Where the ray enters the box, if it does so at 0 ≤ t ≤ `t_max`.
@@ -87,97 +89,10 @@ impl Probe {
     }
 
     #[inline]
-    fn span(&self, min: Vec3, max: Vec3) -> (f32, f32) {
-        let backward = self.inverse.cmplt(Vec3::ZERO);
+    pub(super) fn span(&self, min: Vec3, max: Vec3) -> (f32, f32) {
+        let backward = self.direction.is_negative_mask();
         let near = (Vec3::select(backward, max, min) - self.near_origin) * self.inverse;
         let far = (Vec3::select(backward, min, max) - self.far_origin) * self.inverse;
         (near.max_element().max(0.0), far.min_element())
-    }
-
-    /// Where the ray meets the triangle, if at 0 < t ≤ `t_max`.
-    ///
-    /// Two triangles with a common edge decide about it with the very same operations, so no ray
-    /// passes between them. `t` is never below where [`Probe::enter`] enters the triangle's box,
-    /// hence a search that skips boxes beyond the best hit finds what trying all triangles finds.
-    #[inline]
-    #[must_use]
-    pub fn triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
-        let [x, y, z] = self.axes;
-        let [a, b, c] = corners.map(|p| p - self.origin);
-        let (ax, ay) = (a[x] - self.shear.x * a[z], a[y] - self.shear.y * a[z]);
-        let (bx, by) = (b[x] - self.shear.x * b[z], b[y] - self.shear.y * b[z]);
-        let (cx, cy) = (c[x] - self.shear.x * c[z], c[y] - self.shear.y * c[z]);
-        // No fused multiply-add: an edge must give the negated value in the neighbouring triangle.
-        let mut u = cx * by - cy * bx;
-        let mut v = ax * cy - ay * cx;
-        let mut w = bx * ay - by * ax;
-        if u == 0.0 || v == 0.0 || w == 0.0 {
-            let edge = |px: f32, py: f32, qx: f32, qy: f32| {
-                (f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)) as f32
-            };
-            (u, v, w) = (edge(cx, cy, bx, by), edge(ax, ay, cx, cy), edge(bx, by, ax, ay));
-        }
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        if !determinant.is_finite() {
-            return self.huge_triangle(corners, t_max);
-        }
-        let (az, bz, cz) = (self.shear.z * a[z], self.shear.z * b[z], self.shear.z * c[z]);
-        let mut t = (u * az + v * bz + w * cz) / determinant;
-        if t <= az.abs().max(bz.abs()).max(cz.abs()) * CANCELLATION {
-            t = self.plane_distance(corners).unwrap_or(t);
-        }
-        let inverse = 1.0 / determinant;
-        self.clamped(corners, t, v * inverse, w * inverse, t_max)
-    }
-
-    /// t of the triangle's plane in double precision; `None` for a ray in the plane.
-    ///
-    /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to
-    /// the origin of the ray that is not enough: a ray that starts on a large triangle would hit it.
-    fn plane_distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let normal = (b - a).cross(c - a);
-        let t = normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3());
-        t.is_finite().then_some(t as f32)
-    }
-
-    /// The same in double precision, for coordinates whose products overflow.
-    #[cold]
-    fn huge_triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
-        let [x, y, z] = self.axes;
-        let shear = self.shear.as_dvec3();
-        let [a, b, c] = corners.map(|p| {
-            let p = p.as_dvec3() - self.origin.as_dvec3();
-            DVec3::new(p[x] - shear.x * p[z], p[y] - shear.y * p[z], shear.z * p[z])
-        });
-        let u = c.x * b.y - c.y * b.x;
-        let v = a.x * c.y - a.y * c.x;
-        let w = b.x * a.y - b.y * a.x;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let t = (u * a.z + v * b.z + w * c.z) / determinant;
-        self.clamped(corners, t as f32, (v / determinant) as f32, (w / determinant) as f32, t_max)
-    }
-
-    fn clamped(&self, corners: &[Vec3; 3], t: f32, u: f32, v: f32, t_max: f32) -> Option<TriangleHit> {
-        // Also false for NaN.
-        if !(t > 0.0 && t <= t_max) {
-            return None;
-        }
-        let [a, b, c] = *corners;
-        let (near, _) = self.span(a.min(b).min(c), a.max(b).max(c));
-        let t = t.max(near);
-        (t <= t_max).then_some(TriangleHit { t, u, v })
     }
 }

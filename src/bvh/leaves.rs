@@ -1,0 +1,227 @@
+//! Triangles in the order of the leaves, laid out for vectors.
+
+use super::packet::{Found, GROUP, PACKET, Packet, lowest};
+use super::simd::{Lanes, Mask, Simd};
+use super::triangle::{BEHIND, Edges, Shear, TriangleHit};
+use super::wide::{Child, MAX_LEAF, WideBvh};
+use super::{Hit, Probe};
+use glam::Vec3;
+use std::ops::ControlFlow;
+
+/// For a leaf of n triangles nine rows of n floats, without gaps: all first corners' x, their y, their z,
+/// then those of the second and the third corners. So a leaf is as compact as its triangles, and a
+/// vector over them is a load from anywhere.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Leaves {
+    rows: Vec<f32>,
+    ids: Vec<u32>,
+}
+
+/// Which hits count.
+pub(super) trait Filter: Copy {
+    /// All do: nothing needs to be asked.
+    const ALL: bool;
+    /// Whether a hit of ray number `ray` counts.
+    fn takes(&self, ray: usize, hit: &Hit) -> bool;
+}
+
+/// All hits count.
+#[derive(Clone, Copy)]
+pub(super) struct All;
+
+impl Filter for All {
+    const ALL: bool = true;
+    #[inline(always)]
+    fn takes(&self, _: usize, _: &Hit) -> bool {
+        true
+    }
+}
+
+/// Those that a function takes.
+#[derive(Clone, Copy)]
+pub(super) struct Only<F>(pub F);
+
+impl<F: Fn(usize, &Hit) -> bool + Copy> Filter for Only<F> {
+    const ALL: bool = false;
+    #[inline(always)]
+    fn takes(&self, ray: usize, hit: &Hit) -> bool {
+        (self.0)(ray, hit)
+    }
+}
+
+impl Leaves {
+    pub fn new(wide: &WideBvh, triangles: &[[Vec3; 3]]) -> Self {
+        let mut rows = vec![0.0; wide.prims.len() * 9 + MAX_LEAF];
+        for node in &wide.nodes {
+            for (slot, &child) in node.children.iter().enumerate() {
+                let Child::Leaf { first, count } = Child::unpack(child) else { continue };
+                if node.child_bounds(slot).is_empty() {
+                    continue;
+                }
+                let leaf = &mut rows[first * 9..(first + count) * 9];
+                for (i, &id) in wide.prims[first..first + count].iter().enumerate() {
+                    for (corner, p) in triangles[id as usize].iter().enumerate() {
+                        for axis in 0..3 {
+                            leaf[(corner * 3 + axis) * count + i] = p[axis];
+                        }
+                    }
+                }
+            }
+        }
+        Self { rows, ids: wide.prims.clone() }
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.rows) + size_of_val(&*self.ids)
+    }
+
+    /// A triangle of a leaf.
+    #[inline(always)]
+    fn corners(rows: &[f32], count: usize, i: usize) -> [Vec3; 3] {
+        let row = |k: usize| rows[k * count + i];
+        std::array::from_fn(|c| Vec3::new(row(3 * c), row(3 * c + 1), row(3 * c + 2)))
+    }
+
+    /// One ray, up to eight triangles. `offer` is told of each hit at or before `t_max`, and whether it takes
+    /// it. Answers with the new `t_max`, or breaks if `ANY` hit will do.
+    #[inline(always)]
+    pub fn test_one<S: Simd, const ANY: bool>(
+        &self,
+        simd: S,
+        probe: &Probe,
+        leaf: (usize, usize),
+        instance: u32,
+        mut t_max: f32,
+        mut offer: impl FnMut(Hit) -> bool,
+    ) -> ControlFlow<(), f32> {
+        let (first, count) = leaf;
+        let rows = &self.rows[first * 9..first * 9 + count * 9 + MAX_LEAF];
+        let splat = |x: f32| S::F8::splat(simd, x);
+        let mut candidates = lowest(count) as u32;
+        let mut certain = 0;
+        let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
+        if !probe.extreme {
+            let shear = Shear {
+                origin: probe.axes.map(|axis| splat(probe.origin[axis % 3])),
+                shear: probe.shear.to_array().map(splat),
+            };
+            let corner = |c: usize| {
+                probe.axes.map(|axis| S::F8::load(simd, &rows[(c * 3 + axis % 3) * count..]))
+            };
+            let edges = shear.edges([corner(0), corner(1), corner(2)]);
+            candidates &= edges.inside(simd).bits();
+            if candidates == 0 {
+                return ControlFlow::Continue(t_max);
+            }
+            let distance = shear.distance(simd, &edges);
+            let doubtful = distance.doubtful.bits();
+            let ahead = distance.t.le(splat(t_max)).bits() & !doubtful;
+            let maybe = doubtful & (distance.reach * splat(BEHIND)).le(distance.t).bits();
+            candidates &= ahead | maybe;
+            certain = ahead;
+            distance.t.store(&mut ts);
+            (edges.weights[1] * distance.inverse_determinant).store(&mut us);
+            (edges.weights[2] * distance.inverse_determinant).store(&mut vs);
+        }
+        while candidates != 0 {
+            let i = candidates.trailing_zeros() as usize % MAX_LEAF;
+            candidates &= candidates - 1;
+            let corners = Self::corners(rows, count, i);
+            let found = if certain >> i & 1 != 0 {
+                probe.clamped(&corners, ts[i], us[i], vs[i], t_max)
+            } else {
+                probe.triangle(&corners, t_max)
+            };
+            if let Some(found) = found {
+                let triangle = self.ids[first + i];
+                let hit = Hit { t: found.t, u: found.u, v: found.v, triangle, instance };
+                if offer(hit) {
+                    t_max = hit.t;
+                    if ANY {
+                        return ControlFlow::Break(());
+                    }
+                }
+            }
+        }
+        ControlFlow::Continue(t_max)
+    }
+
+    /// Rays of a packet, the triangles of a leaf one after the other. Returns the rays that need no more,
+    /// which are those with a hit if `ANY` will do.
+    #[inline(always)]
+    pub fn test_many<S: Simd, F: Filter, const ANY: bool>(
+        &self,
+        simd: S,
+        packet: &mut Packet,
+        leaf: (usize, usize),
+        instance: u32,
+        rays: u64,
+        found: &mut Found,
+        filter: F,
+    ) -> u64 {
+        let (first, count) = leaf;
+        let rows = &self.rows[first * 9..first * 9 + count * 9];
+        let splat = |x: f32| S::F16::splat(simd, x);
+        let mut done = 0;
+        for i in 0..count {
+            let corners = Self::corners(rows, count, i);
+            let permuted = corners.map(|p| packet.axes.map(|axis| splat(p[axis % 3])));
+            let triangle = self.ids[first + i];
+            let mut rest = rays & !done;
+            while rest != 0 {
+                let group = rest.trailing_zeros() as usize / GROUP;
+                let base = group * GROUP;
+                let members = (rest >> base) as u32 & 0xffff;
+                rest &= !(0xffff << base);
+                let shear = packet.shear::<S>(simd, group);
+                let edges: Edges<S::F16> = shear.edges(permuted);
+                let inside = edges.inside(simd).bits() & members;
+                if inside == 0 {
+                    continue;
+                }
+                let distance = shear.distance(simd, &edges);
+                let doubtful = distance.doubtful.bits() & inside;
+                let mut each = doubtful & (distance.reach * splat(BEHIND)).le(distance.t).bits();
+                let certain = inside & !doubtful;
+                let (mut ts, mut us, mut vs) = ([0.0; GROUP], [0.0; GROUP], [0.0; GROUP]);
+                if certain != 0 {
+                    let t = distance.t.max(packet.entry::<S>(simd, group, &corners));
+                    let t_max: S::F16 = packet.t_max.get(simd, group);
+                    let u = edges.weights[1] * distance.inverse_determinant;
+                    let v = edges.weights[2] * distance.inverse_determinant;
+                    let closer = certain & t.lt(t_max).bits();
+                    let equal = certain & t.eq(t_max).bits();
+                    if ANY && F::ALL {
+                        done |= u64::from(closer | equal) << base;
+                    } else if F::ALL {
+                        found.keep::<S>(simd, packet, group, closer, [t, u, v], triangle, instance);
+                        each |= equal;
+                    } else {
+                        each |= closer | equal;
+                    }
+                    if each & certain != 0 {
+                        t.store(&mut ts);
+                        u.store(&mut us);
+                        v.store(&mut vs);
+                    }
+                }
+                while each != 0 {
+                    let k = each.trailing_zeros() as usize % GROUP;
+                    each &= each - 1;
+                    let lane = base + k;
+                    let hit = if certain >> k & 1 != 0 {
+                        Some(TriangleHit { t: ts[k], u: us[k], v: vs[k] })
+                    } else {
+                        packet.probe(lane).triangle(&corners, packet.t_max.0[lane % PACKET])
+                    };
+                    let Some(TriangleHit { t, u, v }) = hit else { continue };
+                    let hit = Hit { t, u, v, triangle, instance };
+                    if found.offer(packet, lane, hit, filter) && ANY {
+                        done |= 1 << lane;
+                    }
+                }
+            }
+        }
+        done
+    }
+}

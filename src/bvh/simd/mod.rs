@@ -1,0 +1,85 @@
+//! The project's one unsafe room: vectors of `f32` for each instruction set, behind one safe trait.
+//!
+//! Kernels are written once, over [`Simd`], and compiled once for each instruction set by [`Isa::run`].
+//! A vector can only be made from a *proof*, a value that exists only where the machine has been seen
+//! to have the instructions. No operation here rounds otherwise than the same operation on single
+//! floats (there is no fused multiply-add and no approximate reciprocal), so every kernel gives the
+//! same bits.
+
+#![expect(unsafe_code, reason = "instructions that not every machine has; see each block")]
+
+mod isa;
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub use isa::{Isa, Job};
+pub use portable::{Narrow, One, Plain};
+
+use std::ops::{Add, Div, Mul, Sub};
+
+/// An instruction set: its vector types, and (as a value) the proof that the machine has it.
+pub trait Simd: Copy {
+    /// Eight floats.
+    type F8: Lanes<Proof = Self> + Octet;
+    /// Sixteen floats.
+    type F16: Lanes<Proof = Self>;
+}
+
+/// Some floats side by side. Nothing here is NaN, hence nothing is promised about NaN.
+pub trait Lanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// How many.
+    const N: usize;
+    /// That they may be used.
+    type Proof: Copy;
+    /// A truth value for each.
+    type Mask: Mask;
+
+    /// The same in each lane.
+    fn splat(proof: Self::Proof, x: f32) -> Self;
+    /// The first of `from`, which must be at least as many.
+    fn load(proof: Self::Proof, from: &[f32]) -> Self;
+    /// Into the first of `to`, which must be at least as many.
+    fn store(self, to: &mut [f32]);
+    /// The smaller of each pair.
+    fn min(self, other: Self) -> Self;
+    /// The larger of each pair.
+    fn max(self, other: Self) -> Self;
+    /// Without sign.
+    fn abs(self) -> Self;
+    /// Less than or equal.
+    fn le(self, other: Self) -> Self::Mask;
+    /// Less than.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// Equal.
+    fn eq(self, other: Self) -> Self::Mask;
+    /// `a` where the bit is set, else `b`; the lowest bit is for the first lane.
+    fn select(bits: u32, a: Self, b: Self) -> Self;
+}
+
+/// Truth values of [`Lanes`].
+pub trait Mask: Copy {
+    /// Both.
+    fn and(self, other: Self) -> Self;
+    /// At least one.
+    fn or(self, other: Self) -> Self;
+    /// As the lowest bits of a number, the first lane's the lowest.
+    fn bits(self) -> u32;
+}
+
+/// What only vectors of eight are asked for: the children of a node.
+pub trait Octet: Lanes {
+    /// Puts the lanes of `near` for which `near` ≤ `far`, and their `children`, at the front of the
+    /// stacks, in the order that the eight triples of bits of `order` name; returns how many. The
+    /// stacks have room for eight, and may be left with anything beyond the ones counted.
+    fn push_entered(
+        near: Self,
+        far: Self,
+        order: u32,
+        children: &[u32; 8],
+        nears: &mut [f32; 8],
+        waiting: &mut [u32; 8],
+    ) -> usize;
+}
