@@ -1,7 +1,7 @@
 //! The hierarchy against brute force, and the hard cases of intersection. No tolerance anywhere.
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Hit, Node, Placement, Probe, Ray, Tlas};
+use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Hit, Isa, Node, Placement, Probe, Ray, Tlas};
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -66,29 +66,56 @@ fn aimed_ray(rng: &mut Rng, triangles: &[[Vec3; 3]], scale: f32, center: Vec3) -
     Ray::new(origin, target - origin)
 }
 
+/// What one kernel says of rays: one by one and together, which must be the same.
+fn ask(name: &str, blas: &Blas, rays: &[Ray]) -> Vec<Option<Hit>> {
+    let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
+    blas.closest_hits(rays, &mut hits);
+    blas.any_hits(rays, &mut blocked);
+    for (i, ray) in rays.iter().enumerate() {
+        assert_eq!(blas.closest_hit(ray), hits[i], "{name}: ray {i} alone, {ray:?}");
+        assert_eq!(blas.any_hit(ray), hits[i].is_some(), "{name}: any-hit, ray {i} alone, {ray:?}");
+        assert_eq!(blocked[i], hits[i].is_some(), "{name}: any-hit, ray {i}, {ray:?}");
+    }
+    hits
+}
+
 fn same_as_brute_force(name: &str, triangles: &[[Vec3; 3]], rays: usize) {
     let blas = Blas::build(triangles);
-    blas.bvh().check(&boxes(triangles)).unwrap_or_else(|defect| panic!("{name}: {defect}"));
+    blas.hierarchy().check(Some(&boxes(triangles))).unwrap_or_else(|defect| panic!("{name}: {defect}"));
     let bounds = blas.bounds();
     let scale = (bounds.max * 0.5 - bounds.min * 0.5).max_element().max(1e-20) * 1.5;
     let mut rng = Rng(7);
-    for i in 0..rays {
-        let ray = aimed_ray(&mut rng, triangles, scale, bounds.center());
-        if ray.direction == Vec3::ZERO || !ray.direction.is_finite() {
-            continue;
-        }
-        let expected = brute_force(triangles, &ray);
-        assert_eq!(blas.closest_hit(&ray), expected, "{name}: ray {i} {ray:?}");
-        assert_eq!(blas.any_hit(&ray), expected.is_some(), "{name}: any-hit, ray {i} {ray:?}");
-        if let Some(hit) = expected {
-            let short = Ray { t_max: hit.t, ..ray };
-            assert!(blas.any_hit(&short), "{name}: t_max itself counts");
-            let shorter = Ray { t_max: hit.t.next_down(), ..ray };
-            assert_eq!(
-                blas.any_hit(&shorter),
-                brute_force(triangles, &shorter).is_some(),
-                "{name}: just before"
-            );
+    let mut all: Vec<Ray> = (0..rays)
+        .flat_map(|_| {
+            let ray = aimed_ray(&mut rng, triangles, scale, bounds.center());
+            // Each with close neighbours, so that there are packets of all sizes.
+            let near = rng.below(3);
+            (0..=near).map(move |k| Ray { origin: ray.origin + ray.direction * (k as f32 * 1e-3), ..ray })
+        })
+        .filter(|ray| ray.direction != Vec3::ZERO && ray.direction.is_finite() && ray.origin.is_finite())
+        .collect();
+    let expected: Vec<Option<Hit>> = all.iter().map(|ray| brute_force(triangles, ray)).collect();
+    let ends: Vec<(Ray, Ray)> = all
+        .iter()
+        .zip(&expected)
+        .filter_map(|(&ray, hit)| {
+            let t = (*hit)?.t;
+            Some((Ray { t_max: t, ..ray }, Ray { t_max: t.next_down(), ..ray }))
+        })
+        .collect();
+    all.extend(ends.iter().flat_map(|&(at, before)| [at, before]));
+    let expected: Vec<Option<Hit>> = expected
+        .into_iter()
+        .chain(ends.iter().flat_map(|(at, before)| {
+            let hit = brute_force(triangles, at);
+            assert!(hit.is_some(), "{name}: t_max itself counts");
+            [hit, brute_force(triangles, before)]
+        }))
+        .collect();
+    for isa in Isa::available() {
+        let name = format!("{name}, {}", isa.name());
+        for (i, (hit, expected)) in ask(&name, &blas.clone().with_isa(isa), &all).iter().zip(&expected).enumerate() {
+            assert_eq!(hit, expected, "{name}: ray {i} {:?}", all[i]);
         }
     }
 }
@@ -454,7 +481,7 @@ proptest! {
     ) {
         let triangles: Vec<[Vec3; 3]> = corners.iter().map(|t| t.map(Vec3::from_array)).collect();
         let blas = Blas::build(&triangles);
-        prop_assert_eq!(blas.bvh().check(&boxes(&triangles)), Ok(()));
+        prop_assert_eq!(blas.hierarchy().check(Some(&boxes(&triangles))), Ok(()));
         for (origin, direction) in rays {
             let ray = Ray::new(Vec3::from_array(origin), Vec3::from_array(direction));
             prop_assert_eq!(blas.closest_hit(&ray), brute_force(&triangles, &ray));

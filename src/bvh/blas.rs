@@ -1,10 +1,9 @@
 //! Bottom level: the triangles of one mesh.
 
-use super::batch::trace_batch;
-use super::leaves::Leaves;
-use super::simd::{Isa, Job, Simd};
-use super::single::Waiting;
-use super::wide::WideBvh;
+use super::batch::{Batch, Scratch, Target, Triangles};
+use super::leaves::{All, Filter, Leaves};
+use super::simd::{Isa, Simd};
+use super::wide::{WideBvh, WideNode};
 use super::{Aabb, Bvh, Hit, Probe, Ray};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -63,113 +62,81 @@ impl Blas {
     /// The nearest hit; of equally near ones that of the lowest triangle index.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.isa.run(Single::<false> { blas: self, ray })
+        let mut found = None;
+        self.batch::<_, false>(std::slice::from_ref(ray), |_, hit| found = hit);
+        found
     }
 
     /// Whether there is any hit.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.isa.run(Single::<true> { blas: self, ray }).is_some()
+        let mut found = None;
+        self.batch::<_, true>(std::slice::from_ref(ray), |_, hit| found = hit);
+        found.is_some()
     }
 
-    /// [`Blas::closest_hit`] for each ray, faster where neighbours go similar ways.
+    /// [`Blas::closest_hit`] for each ray, faster for that, above all where neighbours go similar ways.
     ///
     /// # Panics
     /// Unless there are as many `hits` as `rays`.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len());
-        self.isa.run(Many::<false, _> { blas: self, rays, report: |i: usize, hit| hits[i] = hit });
+        self.batch::<_, false>(rays, |i, hit| hits[i] = hit);
     }
 
-    /// [`Blas::any_hit`] for each ray, faster where neighbours go similar ways.
+    /// [`Blas::any_hit`] for each ray, faster for that, above all where neighbours go similar ways.
     ///
     /// # Panics
     /// Unless there are as many `blocked` as `rays`.
     pub fn any_hits(&self, rays: &[Ray], blocked: &mut [bool]) {
         assert_eq!(rays.len(), blocked.len());
-        let report = |i: usize, hit: Option<Hit>| blocked[i] = hit.is_some();
-        self.isa.run(Many::<true, _> { blas: self, rays, report });
+        self.batch::<_, true>(rays, |i, hit| blocked[i] = hit.is_some());
+    }
+
+    fn batch<R: FnMut(usize, Option<Hit>), const ANY: bool>(&self, rays: &[Ray], report: R) {
+        Batch::<_, _, _, ANY> { target: self, rays, filter: All, report }.run(self.isa);
     }
 }
 
-impl Blas {
+impl Target for Blas {
+    const ONE_LEVEL: bool = true;
+
     #[inline(always)]
-    pub(super) fn trace_one<S: Simd, const ANY: bool>(
+    fn nodes(&self) -> &[WideNode] {
+        &self.wide.nodes
+    }
+
+    #[inline(always)]
+    fn only(&self) -> Option<(&Blas, u32)> {
+        Some((self, 0))
+    }
+
+    #[inline(always)]
+    fn probe(&self, ray: &Ray) -> Probe {
+        Probe::new(ray, &self.wide.bounds)
+    }
+
+    #[inline(always)]
+    fn bounds(&self) -> (Aabb, f32) {
+        (self.wide.bounds, 1.0)
+    }
+
+    #[inline(always)]
+    fn enter(&self, _: usize, _: &Ray) -> (&Blas, u32, Option<Probe>) {
+        (self, 0, None)
+    }
+
+    #[inline(always)]
+    fn traverse_packet<S: Simd, F: Filter, const ANY: bool>(
         &self,
         simd: S,
-        ray: &Ray,
-        waiting: &mut Waiting,
-    ) -> Option<Hit> {
-        let probe = Probe::new(ray, &self.bounds());
-        let mut best: Option<Hit> = None;
-        // Broken off or not, what was found is in `best`.
-        let _ = self.wide.traverse(simd, &probe, 0, ray.t_max, waiting, |first, count, t_max| {
-            self.leaves.test_one::<S, ANY>(simd, &probe, (first, count), 0, t_max, |hit| {
-                let better = best.is_none_or(|known| hit.beats(&known));
-                if better {
-                    best = Some(hit);
-                }
-                better
-            })
-        });
-        best
-    }
-}
-
-impl Blas {
-    pub(super) fn closest_accepted(&self, probe: &Probe, t_max: f32, instance: u32, best: Option<Hit>, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        self.isa.run(Interim::<false, _> { blas: self, probe, t_max, instance, best, accept })
-    }
-    pub(super) fn any_accepted(&self, probe: &Probe, t_max: f32, instance: u32, accept: impl Fn(&Hit) -> bool) -> bool {
-        self.isa.run(Interim::<true, _> { blas: self, probe, t_max, instance, best: None, accept }).is_some()
-    }
-}
-struct Interim<'a, const ANY: bool, A> { blas: &'a Blas, probe: &'a Probe, t_max: f32, instance: u32, best: Option<Hit>, accept: A }
-impl<const ANY: bool, A: Fn(&Hit) -> bool> Job for Interim<'_, ANY, A> {
-    type Output = Option<Hit>;
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let mut best = self.best;
-        let t_max = best.map_or(self.t_max, |b| b.t);
-        let _ = self.blas.wide.traverse(simd, self.probe, 0, t_max, &mut Waiting::default(), |first, count, t_max| {
-            self.blas.leaves.test_one::<S, ANY>(simd, self.probe, (first, count), self.instance, t_max, |hit| {
-                let better = best.is_none_or(|known| hit.beats(&known)) && (self.accept)(&hit);
-                if better {
-                    best = Some(hit);
-                }
-                better
-            })
-        });
-        best
-    }
-}
-
-struct Single<'a, const ANY: bool> {
-    blas: &'a Blas,
-    ray: &'a Ray,
-}
-
-impl<const ANY: bool> Job for Single<'_, ANY> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        self.blas.trace_one::<S, ANY>(simd, self.ray, &mut Waiting::default())
-    }
-}
-
-struct Many<'a, const ANY: bool, R> {
-    blas: &'a Blas,
-    rays: &'a [Ray],
-    report: R,
-}
-
-impl<const ANY: bool, R: FnMut(usize, Option<Hit>)> Job for Many<'_, ANY, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(mut self, simd: S) {
-        trace_batch::<S, ANY>(simd, self.blas, self.rays, &mut self.report);
+        scratch: &mut Scratch,
+        rays: u64,
+        filter: F,
+    ) -> u64 {
+        let Scratch { packet, found, waiting, numbers, .. } = scratch;
+        let mut visitor = Triangles::<F, ANY> { blas: self, instance: 0, found, numbers, filter };
+        self.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor)
     }
 }
 

@@ -1,8 +1,9 @@
 //! Triangles in the order of the leaves, laid out for vectors.
 
+use super::probe::AXES;
 use super::packet::{Found, GROUP, PACKET, Packet, lowest};
-use super::simd::{Lanes, Mask, Simd};
-use super::triangle::{BEHIND, Edges, Shear, TriangleHit};
+use super::simd::{Lanes, Mask, Simd, prefetch, three};
+use super::triangle::{Edges, Shear, TriangleHit};
 use super::wide::{Child, MAX_LEAF, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
@@ -75,11 +76,17 @@ impl Leaves {
         size_of_val(&*self.rows) + size_of_val(&*self.ids)
     }
 
+    /// Asks for a leaf to be brought near.
+    #[inline(always)]
+    pub fn prefetch(&self, first: usize) {
+        prefetch(&self.rows, first * 9);
+    }
+
     /// A triangle of a leaf.
     #[inline(always)]
     fn corners(rows: &[f32], count: usize, i: usize) -> [Vec3; 3] {
         let row = |k: usize| rows[k * count + i];
-        std::array::from_fn(|c| Vec3::new(row(3 * c), row(3 * c + 1), row(3 * c + 2)))
+        three(|c| Vec3::new(row(3 * c), row(3 * c + 1), row(3 * c + 2)))
     }
 
     /// One ray, up to eight triangles. `offer` is told of each hit at or before `t_max`, and whether it takes
@@ -102,23 +109,18 @@ impl Leaves {
         let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
         if !probe.extreme {
             let shear = Shear {
-                origin: probe.axes.map(|axis| splat(probe.origin[axis % 3])),
-                shear: probe.shear.to_array().map(splat),
+                origin: three(|i| splat(probe.sheared_origin[i])),
+                shear: three(|i| splat(probe.shear[i])),
             };
-            let corner = |c: usize| {
-                probe.axes.map(|axis| S::F8::load(simd, &rows[(c * 3 + axis % 3) * count..]))
-            };
-            let edges = shear.edges([corner(0), corner(1), corner(2)]);
+            let edges = shear.edges(S::F8::load_corners(simd, rows, count, &AXES[probe.axis]));
             candidates &= edges.inside(simd).bits();
             if candidates == 0 {
                 return ControlFlow::Continue(t_max);
             }
             let distance = shear.distance(simd, &edges);
             let doubtful = distance.doubtful.bits();
-            let ahead = distance.t.le(splat(t_max)).bits() & !doubtful;
-            let maybe = doubtful & (distance.reach * splat(BEHIND)).le(distance.t).bits();
-            candidates &= ahead | maybe;
-            certain = ahead;
+            certain = distance.ahead.and(distance.t.le(splat(t_max))).bits() & !doubtful;
+            candidates &= certain | doubtful;
             distance.t.store(&mut ts);
             (edges.weights[1] * distance.inverse_determinant).store(&mut us);
             (edges.weights[2] * distance.inverse_determinant).store(&mut vs);
@@ -146,7 +148,8 @@ impl Leaves {
         ControlFlow::Continue(t_max)
     }
 
-    /// Rays of a packet, the triangles of a leaf one after the other. Returns the rays that need no more,
+    /// Rays of a packet, the triangles of a leaf one after the other. `takes` is asked about lanes' hits
+    /// unless `F` takes all. Returns the rays that need no more,
     /// which are those with a hit if `ANY` will do.
     #[inline(always)]
     pub fn test_many<S: Simd, F: Filter, const ANY: bool>(
@@ -157,15 +160,16 @@ impl Leaves {
         instance: u32,
         rays: u64,
         found: &mut Found,
-        filter: F,
+        takes: impl Fn(usize, &Hit) -> bool,
     ) -> u64 {
         let (first, count) = leaf;
         let rows = &self.rows[first * 9..first * 9 + count * 9];
         let splat = |x: f32| S::F16::splat(simd, x);
+        let [x, y, z] = AXES[packet.axis];
         let mut done = 0;
         for i in 0..count {
             let corners = Self::corners(rows, count, i);
-            let permuted = corners.map(|p| packet.axes.map(|axis| splat(p[axis % 3])));
+            let permuted = three(|c| [splat(corners[c][x]), splat(corners[c][y]), splat(corners[c][z])]);
             let triangle = self.ids[first + i];
             let mut rest = rays & !done;
             while rest != 0 {
@@ -176,13 +180,15 @@ impl Leaves {
                 let shear = packet.shear::<S>(simd, group);
                 let edges: Edges<S::F16> = shear.edges(permuted);
                 let inside = edges.inside(simd).bits() & members;
-                if inside == 0 {
+                if inside == 0 && !packet.extreme {
                     continue;
                 }
                 let distance = shear.distance(simd, &edges);
-                let doubtful = distance.doubtful.bits() & inside;
-                let mut each = doubtful & (distance.reach * splat(BEHIND)).le(distance.t).bits();
-                let certain = inside & !doubtful;
+                let mut each = distance.doubtful.bits() & inside;
+                let mut certain = distance.ahead.bits() & inside & !each;
+                if packet.extreme {
+                    (each, certain) = (members, 0);
+                }
                 let (mut ts, mut us, mut vs) = ([0.0; GROUP], [0.0; GROUP], [0.0; GROUP]);
                 if certain != 0 {
                     let t = distance.t.max(packet.entry::<S>(simd, group, &corners));
@@ -216,7 +222,7 @@ impl Leaves {
                     };
                     let Some(TriangleHit { t, u, v }) = hit else { continue };
                     let hit = Hit { t, u, v, triangle, instance };
-                    if found.offer(packet, lane, hit, filter) && ANY {
+                    if found.offer(packet, lane, hit, |hit| takes(lane, hit)) && ANY {
                         done |= 1 << lane;
                     }
                 }

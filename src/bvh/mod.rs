@@ -17,6 +17,7 @@ mod single;
 pub mod tlas;
 pub mod traverse;
 pub mod triangle;
+mod walk;
 pub mod wide;
 
 pub use aabb::Aabb;

@@ -7,11 +7,10 @@
 //! for Real-time Whitted Ray Tracing", RT 2008 (ranged traversal); S. Boulos, I. Wald, P. Shirley,
 //! "Geometric and Arithmetic Culling Methods for Entire Ray Packets", 2006 (interval arithmetic).
 
-use super::probe::{Probe, SLACK, is_extreme};
-use super::simd::{Lanes, Mask, Octet, Simd};
+use super::probe::{AXES, Probe, SLACK, is_extreme, largest_axis};
+use super::simd::{Lanes, Mask, Octet, Simd, three};
 use super::single::Waiting;
 use super::wide::{Child, MAX_WAITING, WIDTH, WideBvh, WideNode};
-use super::leaves::Filter;
 use super::triangle::Shear;
 use super::{Aabb, Hit, Ray};
 use glam::Vec3;
@@ -22,7 +21,7 @@ pub(super) const PACKET: usize = 64;
 /// Rays that are tested with one vector.
 pub(super) const GROUP: usize = 16;
 /// With no more rays than this left, each goes on alone.
-const FEW: u32 = 3;
+const FEW: u32 = 4;
 
 /// One float for each ray.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +46,7 @@ impl Row {
 #[derive(Clone, Debug)]
 pub(super) struct Packet {
     /// As in [`Probe`].
-    pub axes: [usize; 3],
+    pub axis: usize,
     pub octant: usize,
     pub origin: [Row; 3],
     pub direction: [Row; 3],
@@ -95,6 +94,17 @@ impl Found {
         })
     }
 
+    /// Overwrites a lane by a lane of another packet's.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, other: &Self, from: usize) {
+        let (to, from) = (to % PACKET, from % PACKET);
+        self.rays = self.rays & !(1 << to) | (other.rays >> from & 1) << to;
+        self.u.0[to] = other.u.0[from];
+        self.v.0[to] = other.v.0[from];
+        self.triangle[to] = other.triangle[from];
+        self.instance[to] = other.instance[from];
+    }
+
     /// Takes the [t, u, v] of the lanes of `group` whose bits are set, all nearer than what was known.
     #[inline(always)]
     pub fn keep<S: Simd>(
@@ -120,10 +130,16 @@ impl Found {
         self.rays |= u64::from(lanes) << (group * GROUP);
     }
 
-    /// Takes a hit at or before the ray's `t_max` if it is the better one and the filter takes it.
+    /// Takes a hit at or before the ray's `t_max` if it is the better one and counts.
     #[inline(always)]
-    pub fn offer<F: Filter>(&mut self, packet: &mut Packet, lane: usize, hit: Hit, filter: F) -> bool {
-        let better = self.hit(packet, lane).is_none_or(|known| hit.beats(&known)) && filter.takes(lane, &hit);
+    pub fn offer(
+        &mut self,
+        packet: &mut Packet,
+        lane: usize,
+        hit: Hit,
+        takes: impl FnOnce(&Hit) -> bool,
+    ) -> bool {
+        let better = self.hit(packet, lane).is_none_or(|known| hit.beats(&known)) && takes(&hit);
         if better {
             let lane = lane % PACKET;
             packet.t_max.0[lane] = hit.t;
@@ -179,7 +195,7 @@ impl Packet {
     pub fn blank() -> Self {
         let row = [Row([0.0; PACKET]); 3];
         Self {
-            axes: [0, 1, 2],
+            axis: 2,
             octant: 0,
             origin: row,
             direction: row,
@@ -214,20 +230,22 @@ impl Packet {
                 self.origin[axis].0[lane] = origin[axis];
                 self.direction[axis].0[lane] = direction[axis];
             }
-            self.t_max.0[lane] = t_max;
+            // Nothing is wanted where there is no ray.
+            self.t_max.0[lane] = if lane < count { t_max } else { 0.0 };
         }
         self.octant = class.octant();
-        let z = class.axis();
-        self.axes = [(z + 1) % 3, (z + 2) % 3, z];
+        self.axis = class.axis();
+        let [x, y, z] = AXES[self.axis];
         let constant = |x: f32| S::F16::splat(simd, x);
         let one = constant(1.0);
+        let finite = |lanes: S::F16| lanes.min(constant(f32::MAX)).max(constant(-f32::MAX));
         let mut spans = [[[constant(f32::INFINITY), constant(f32::NEG_INFINITY)]; 3]; 3];
         let mut reaches = [constant(f32::INFINITY), constant(0.0)];
         for group in 0..groups {
             let row = |rows: &[Row; 3], axis: usize| rows[axis].get::<S::F16>(simd, group);
-            let origin: [S::F16; 3] = std::array::from_fn(|axis| row(&self.origin, axis));
-            let direction: [S::F16; 3] = std::array::from_fn(|axis| row(&self.direction, axis));
-            let reach: [S::F16; 3] = std::array::from_fn(|axis| {
+            let origin: [S::F16; 3] = three(|axis| row(&self.origin, axis));
+            let direction: [S::F16; 3] = three(|axis| row(&self.direction, axis));
+            let reach: [S::F16; 3] = three(|axis| {
                 let below = (constant(bounds.min[axis]) - origin[axis]).abs();
                 below.max((constant(bounds.max[axis]) - origin[axis]).abs())
             });
@@ -236,7 +254,7 @@ impl Packet {
                 let slack = (reach[axis] + reach[z]) * constant(SLACK * slack) + step;
                 let (less, more) = (origin[axis] - slack, origin[axis] + slack);
                 let (near, far) = if self.octant >> axis & 1 == 0 { (more, less) } else { (less, more) };
-                let inverse = (one / direction[axis]).min(constant(f32::MAX)).max(constant(-f32::MAX));
+                let [near, far, inverse] = [finite(near), finite(far), finite(one / direction[axis])];
                 self.near_origin[axis].set(group, near);
                 self.far_origin[axis].set(group, far);
                 self.inverse[axis].set(group, inverse);
@@ -244,7 +262,6 @@ impl Packet {
                     *span = [span[0].min(lanes), span[1].max(lanes)];
                 }
             }
-            let [x, y, z] = self.axes;
             self.shear[0].set(group, direction[x] / direction[z]);
             self.shear[1].set(group, direction[y] / direction[z]);
             self.shear[2].set(group, one / direction[z]);
@@ -252,7 +269,7 @@ impl Packet {
             reaches = [reaches[0].min(farthest), reaches[1].max(farthest)];
         }
         for axis in 0..3 {
-            let [near, far, inverse] = spans[axis].map(|[low, high]| [lane_min(low), lane_max(high)]);
+            let [near, far, inverse] = three(|i| [lane_min(spans[axis][i][0]), lane_max(spans[axis][i][1])]);
             let backward = self.octant >> axis & 1;
             self.first[axis] = near[1 - backward];
             self.last[axis] = far[backward];
@@ -261,15 +278,25 @@ impl Packet {
         self.extreme = is_extreme(lane_min(reaches[0])) || is_extreme(lane_max(reaches[1]));
     }
 
-    /// One of the rays, alone.
+    /// One of the rays, as far as it is still wanted.
+    #[inline(always)]
+    pub fn ray(&self, lane: usize) -> Ray {
+        let lane = lane % PACKET;
+        let vec = |rows: &[Row; 3]| Vec3::new(rows[0].0[lane], rows[1].0[lane], rows[2].0[lane]);
+        Ray { origin: vec(&self.origin), direction: vec(&self.direction), t_max: self.t_max.0[lane] }
+    }
+
+    /// One of the rays, alone and ready.
     #[inline(always)]
     pub fn probe(&self, lane: usize) -> Probe {
         let lane = lane % PACKET;
-        let vec = |rows: &[Row; 3]| Vec3::from_array(std::array::from_fn(|axis| rows[axis].0[lane]));
+        let [x, y, z] = AXES[self.axis];
+        let vec = |rows: &[Row; 3]| Vec3::new(rows[0].0[lane], rows[1].0[lane], rows[2].0[lane]);
         Probe {
             origin: vec(&self.origin),
             direction: vec(&self.direction),
-            axes: self.axes,
+            axis: self.axis,
+            sheared_origin: Vec3::new(self.origin[x].0[lane], self.origin[y].0[lane], self.origin[z].0[lane]),
             shear: vec(&self.shear),
             inverse: vec(&self.inverse),
             near_origin: vec(&self.near_origin),
@@ -281,9 +308,10 @@ impl Packet {
     /// A group of rays, for triangles.
     #[inline(always)]
     pub fn shear<S: Simd>(&self, simd: S, group: usize) -> Shear<S::F16> {
+        let axes = AXES[self.axis];
         Shear {
-            origin: self.axes.map(|axis| self.origin[axis % 3].get(simd, group)),
-            shear: std::array::from_fn(|axis| self.shear[axis].get(simd, group)),
+            origin: three(|i| self.origin[axes[i]].get(simd, group)),
+            shear: three(|i| self.shear[i].get(simd, group)),
         }
     }
 
@@ -312,16 +340,16 @@ impl Packet {
     fn entering<S: Simd>(&self, simd: S, node: &WideNode, slot: usize, rays: u64, ranged: bool) -> u64 {
         let rows = self.near_rows();
         let near: [S::F16; 3] =
-            std::array::from_fn(|axis| S::F16::splat(simd, node.bounds[rows[axis] % 6][slot % 8]));
+            three(|axis| S::F16::splat(simd, node.bounds[rows[axis] % 6][slot % 8]));
         let far: [S::F16; 3] =
-            std::array::from_fn(|axis| S::F16::splat(simd, node.bounds[(rows[axis] ^ 1) % 6][slot % 8]));
+            three(|axis| S::F16::splat(simd, node.bounds[(rows[axis] ^ 1) % 6][slot % 8]));
         let zero = S::F16::splat(simd, 0.0);
         let mut entering = rays;
         let mut rest = rays;
         while rest != 0 {
             let group = rest.trailing_zeros() as usize / GROUP;
             let row = |rows: &[Row; 3], axis: usize| rows[axis].get::<S::F16>(simd, group);
-            let inverse: [S::F16; 3] = std::array::from_fn(|axis| row(&self.inverse, axis));
+            let inverse: [S::F16; 3] = three(|axis| row(&self.inverse, axis));
             let enter = |axis: usize| (near[axis] - row(&self.near_origin, axis)) * inverse[axis];
             let leave = |axis: usize| (far[axis] - row(&self.far_origin, axis)) * inverse[axis];
             let entry = enter(0).max(enter(1)).max(enter(2).max(zero));
@@ -369,10 +397,7 @@ pub(super) const CLASSES: usize = 24;
 impl Class {
     #[inline(always)]
     pub fn of(direction: Vec3) -> Self {
-        let d = direction.abs();
-        // As `max_position`: the first of equals.
-        let axis = if d.x >= d.y && d.x >= d.z { 0 } else if d.y >= d.z { 1 } else { 2 };
-        Self((direction.is_negative_bitmask() as u8) | axis << 3)
+        Self((direction.is_negative_bitmask() as u8) | (largest_axis(direction) as u8) << 3)
     }
 
     #[inline(always)]
@@ -502,17 +527,18 @@ impl Packet {
         let row = |row: usize| S::F8::load(simd, &node.bounds[row % 6]);
         let enter = |axis: usize| {
             let p = row(rows[axis]) - splat(self.first[axis]);
-            let [low, high] = self.inverse_span[axis].map(splat);
+            let [low, high] = [splat(self.inverse_span[axis][0]), splat(self.inverse_span[axis][1])];
             (p * low).min(p * high)
         };
         let leave = |axis: usize| {
             let p = row(rows[axis] ^ 1) - splat(self.last[axis]);
-            let [low, high] = self.inverse_span[axis].map(splat);
+            let [low, high] = [splat(self.inverse_span[axis][0]), splat(self.inverse_span[axis][1])];
             (p * low).max(p * high)
         };
         let entry = enter(0).max(enter(1)).max(enter(2).max(splat(0.0)));
         let exit = leave(0).min(leave(1)).min(leave(2).min(splat(t_bound)));
-        let children: [u32; WIDTH] = std::array::from_fn(|slot| (index * WIDTH + slot) as u32);
+        let base = (index * WIDTH) as u32;
+        let children = [base, base + 1, base + 2, base + 3, base + 4, base + 5, base + 6, base + 7];
         let to = (
             (&mut waiting.nears[count..count + WIDTH]).try_into(),
             (&mut waiting.children[count..count + WIDTH]).try_into(),

@@ -1,7 +1,7 @@
 //! A ray made ready for boxes and triangles.
 
 use super::{Aabb, Ray};
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// A [`Ray`] prepared for everything inside one bounding box.
 ///
@@ -16,8 +16,10 @@ use glam::Vec3;
 pub struct Probe {
     pub(super) origin: Vec3,
     pub(super) direction: Vec3,
-    /// Axis of the largest direction component last.
-    pub(super) axes: [usize; 3],
+    /// That of the largest direction component; space is sheared along it.
+    pub(super) axis: usize,
+    /// The origin's components in the order of [`AXES`].
+    pub(super) sheared_origin: Vec3,
     /// Along the other axes, how far the ray goes while it goes 1 along the last; its t there.
     pub(super) shear: Vec3,
     /// Reciprocal direction; ±`f32::MAX` where a component is 0, so that 0 · ∞ cannot happen.
@@ -26,6 +28,17 @@ pub struct Probe {
     pub(super) far_origin: Vec3,
     /// Triangles have to be tested in double precision.
     pub(super) extreme: bool,
+}
+
+/// Row by row, for each axis: the next two, and then itself.
+pub(super) const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
+/// Of the largest component; the first of equals.
+#[inline(always)]
+pub(super) fn largest_axis(v: Vec3) -> usize {
+    let v = v.abs();
+    let of_xy = usize::from(v.y > v.x);
+    if v.z > v.x.max(v.y) { 2 } else { of_xy }
 }
 
 /// 5 units from the triangle test, 3 from the box test's own operations, rounded up.
@@ -47,26 +60,33 @@ impl Probe {
 
     /// As [`Probe::new`], with boxes `factor` times as far beyond their true borders (a [`super::Tlas`]
     /// needs this: a ray that is rounded when transformed may hit what the original misses).
+    #[inline(always)]
     pub(super) fn with_slack(ray: &Ray, bounds: &Aabb, factor: f32) -> Self {
-        let direction = ray.direction;
-        let z = direction.abs().max_position();
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let shear = Vec3::new(direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]);
+        let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
+        let axis = largest_axis(ray.direction);
+        let [x, y, z] = AXES[axis];
+        let along = ray.direction[z];
+        let sheared = direction / Vec3A::splat(along);
+        let shear = Vec3::new(sheared[x], sheared[y], 1.0 / along);
 
-        let reach = (bounds.min - ray.origin).abs().max((bounds.max - ray.origin).abs());
+        let (below, above) = (Vec3A::from(bounds.min) - origin, Vec3A::from(bounds.max) - origin);
+        let reach = below.abs().max(above.abs());
         // Two steps of the origin's own floats more: far from the world's origin a small sum rounds to nothing.
-        let step = ray.origin.abs() * (2.0 * f32::EPSILON) + f32::MIN_POSITIVE;
+        let step = origin.abs() * (2.0 * f32::EPSILON) + f32::MIN_POSITIVE;
         let slack = (reach + reach[z]) * (SLACK * factor) + step;
-        let outward = Vec3::ONE.copysign(direction);
-        let inverse = direction.map(|d| (1.0 / d).clamp(-f32::MAX, f32::MAX));
+        let outward = Vec3A::ONE.copysign(direction);
+        // Infinity less infinity is not to happen either.
+        let finite = |v: Vec3A| v.min(Vec3A::MAX).max(Vec3A::MIN);
+        let inverse = finite(1.0 / direction);
         Self {
             origin: ray.origin,
-            direction,
-            axes: [x, y, z],
+            direction: ray.direction,
+            axis,
+            sheared_origin: Vec3::new(ray.origin[x], ray.origin[y], ray.origin[z]),
             shear,
-            inverse,
-            near_origin: ray.origin + outward * slack,
-            far_origin: ray.origin - outward * slack,
+            inverse: inverse.into(),
+            near_origin: finite(origin + outward * slack).into(),
+            far_origin: finite(origin - outward * slack).into(),
             extreme: is_extreme(reach.max_element()),
         }
     }

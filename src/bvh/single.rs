@@ -1,21 +1,39 @@
 //! The loop of one ray through a hierarchy.
 
 use super::probe::Probe;
-use super::simd::{Lanes, Octet, Simd};
+use super::simd::{Lanes, Octet, Simd, three};
 use super::wide::{Child, MAX_WAITING, WIDTH, WideBvh, WideNode};
 use std::ops::ControlFlow;
+
+/// Those of an instance on top of those of the world.
+const BOTH_LEVELS: usize = 2 * MAX_WAITING;
 
 /// Children that a ray has yet to visit, and where it enters them. Kept between rays: clearing it would
 /// cost as much as some rays.
 #[derive(Debug)]
 pub struct Waiting {
-    nears: [f32; MAX_WAITING],
-    children: [u32; MAX_WAITING],
+    nears: [f32; BOTH_LEVELS],
+    children: [u32; BOTH_LEVELS],
 }
 
 impl Default for Waiting {
     fn default() -> Self {
-        Self { nears: [0.0; MAX_WAITING], children: [0; MAX_WAITING] }
+        Self { nears: [0.0; BOTH_LEVELS], children: [0; BOTH_LEVELS] }
+    }
+}
+
+impl Waiting {
+    /// Lets a child wait.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, near: f32, child: Child) {
+        self.nears[i] = near;
+        self.children[i] = child.pack();
+    }
+
+    /// Where the ray enters a waiting child, and what it is.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> (f32, u32) {
+        (self.nears[i], self.children[i])
     }
 }
 
@@ -61,7 +79,7 @@ impl WideBvh {
 }
 
 /// A ray made ready for eight boxes at once.
-struct Boxes<S: Simd> {
+pub(super) struct Boxes<S: Simd> {
     simd: S,
     near_origin: [S::F8; 3],
     far_origin: [S::F8; 3],
@@ -73,8 +91,8 @@ struct Boxes<S: Simd> {
 
 impl<S: Simd> Boxes<S> {
     #[inline(always)]
-    fn new(simd: S, probe: &Probe) -> Self {
-        let splat = |v: glam::Vec3| [v.x, v.y, v.z].map(|x| S::F8::splat(simd, x));
+    pub fn new(simd: S, probe: &Probe) -> Self {
+        let splat = |v: glam::Vec3| three(|axis| S::F8::splat(simd, v[axis]));
         let octant = probe.octant();
         Self {
             simd,
@@ -88,7 +106,7 @@ impl<S: Simd> Boxes<S> {
 
     /// Puts the children that the ray enters on top of the `count` waiting ones; returns how many.
     #[inline(always)]
-    fn enter(&self, node: &WideNode, t_max: f32, waiting: &mut Waiting, count: usize) -> usize {
+    pub fn enter(&self, node: &WideNode, t_max: f32, waiting: &mut Waiting, count: usize) -> usize {
         let side = |axis: usize, row: usize, origin: &[S::F8; 3]| {
             (S::F8::load(self.simd, &node.bounds[row % 6]) - origin[axis]) * self.inverse[axis]
         };

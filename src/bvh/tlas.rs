@@ -1,5 +1,11 @@
 //! Top level: placed instances of bottom levels.
 
+use super::batch::{Batch, Classes, Scratch, Target, Triangles, each};
+use super::leaves::{All, Filter, Only};
+use super::packet::{Found, PACKET, Packet, Visitor, lowest};
+use super::simd::{Isa, Simd};
+use super::single::Waiting;
+use super::wide::{WideBvh, WideNode};
 use super::{Aabb, Blas, Bvh, Hit, Probe, Ray};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::ops::ControlFlow;
@@ -18,7 +24,8 @@ pub struct Placement {
 /// A hierarchy over placed instances.
 #[derive(Clone, Debug, Default)]
 pub struct Tlas {
-    bvh: Bvh,
+    wide: WideBvh,
+    isa: Isa,
     placements: Vec<Placement>,
     /// How many times more than the world's own rounding a ray may stray when transformed.
     slack: f32,
@@ -52,16 +59,14 @@ impl Placement {
         &self.local_from_world
     }
 
-    /// The same ray made ready in local space; `None` if that is no other than the world's. The
-    /// direction is not normalised, so t stays what it is.
-    #[inline]
-    fn local(&self, ray: &Ray) -> Option<Probe> {
-        let local = |ray: &Ray| Ray {
+    /// The same ray in local space. The direction is not normalised, so t stays what it is.
+    #[inline(always)]
+    fn local(&self, ray: &Ray) -> Ray {
+        Ray {
             origin: self.local_from_world.transform_point3(ray.origin.as_dvec3()).as_vec3(),
             direction: self.local_from_world.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
             t_max: ray.t_max,
-        };
-        (!self.identity).then(|| Probe::new(&local(ray), &self.blas.bounds()))
+        }
     }
 
     /// The box of the placed corners, rounded outward.
@@ -101,7 +106,7 @@ impl Tlas {
             .map(|b| if b.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { b })
             .collect();
         let slack = placements.iter().map(Placement::condition).fold(1.0, f32::max);
-        Self { bvh: Bvh::build(&boxes), placements, slack }
+        Self { wide: WideBvh::new(&Bvh::build(&boxes)), isa: Isa::detect(), placements, slack }
     }
 
     /// What it was built over.
@@ -110,69 +115,229 @@ impl Tlas {
         &self.placements
     }
 
+    /// The same, traced with the given instructions.
+    #[must_use]
+    pub fn with_isa(self, isa: Isa) -> Self {
+        Self { isa, ..self }
+    }
+
     /// The hierarchy, to draw or measure.
     #[must_use]
-    pub fn bvh(&self) -> &Bvh {
-        &self.bvh
+    pub fn hierarchy(&self) -> &WideBvh {
+        &self.wide
     }
 
     /// The box around everything; empty if there is nothing.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
-        self.bvh.bounds()
+        self.wide.bounds
     }
 
     /// The nearest hit; of equally near ones that of the lowest instance, then triangle.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_accepted(ray, |_| true)
+        let mut found = None;
+        self.batch::<_, _, false>(std::slice::from_ref(ray), All, |_, hit| found = hit);
+        found
     }
 
     /// Whether there is any hit.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.any_accepted(ray, |_| true)
+        let mut found = None;
+        self.batch::<_, _, true>(std::slice::from_ref(ray), All, |_, hit| found = hit);
+        found.is_some()
     }
 
-    /// As [`Tlas::closest_hit`], among the hits that `accept` takes.
-    #[inline]
-    #[must_use]
-    pub fn closest_accepted(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        let mut best = None;
-        let probe = self.probe(ray);
-        let _ = self.bvh.traverse::<()>(&probe, ray.t_max, |leaf, t_max| {
-            for &i in &self.bvh.prims[leaf] {
-                let placement = &self.placements[i as usize];
-                let local = placement.local(ray);
-                let probe = local.as_ref().unwrap_or(&probe);
-                best = placement.blas.closest_accepted(probe, ray.t_max, i, best, &accept);
-            }
-            ControlFlow::Continue(best.map_or(t_max, |b: Hit| b.t))
-        });
-        best
+    /// [`Tlas::closest_hit`] of each ray, among the hits that `accept`, if given, takes of the ray of that
+    /// number. Faster than one by one, above all where neighbours go similar ways.
+    ///
+    /// # Panics
+    /// Unless there are as many `hits` as `rays`.
+    pub fn closest_hits(
+        &self,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+        accept: Option<&(impl Fn(usize, &Hit) -> bool + Sync)>,
+    ) {
+        assert_eq!(rays.len(), hits.len());
+        let report = |i: usize, hit| hits[i] = hit;
+        match accept {
+            None => self.batch::<_, _, false>(rays, All, report),
+            Some(accept) => self.batch::<_, _, false>(rays, Only(accept), report),
+        }
     }
 
-    /// As [`Tlas::any_hit`], among the hits that `accept` takes.
-    #[inline]
-    #[must_use]
-    pub fn any_accepted(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> bool {
-        let probe = self.probe(ray);
-        self.bvh
-            .traverse(&probe, ray.t_max, |leaf, t_max| {
-                for &i in &self.bvh.prims[leaf] {
-                    let placement = &self.placements[i as usize];
-                    let local = placement.local(ray);
-                    let probe = local.as_ref().unwrap_or(&probe);
-                    if placement.blas.any_accepted(probe, ray.t_max, i, &accept) {
-                        return ControlFlow::Break(());
-                    }
-                }
-                ControlFlow::Continue(t_max)
-            })
-            .is_break()
+    /// [`Tlas::any_hit`] of each ray, among the hits that `accept`, if given, takes of the ray of that
+    /// number. Faster than one by one, above all where neighbours go similar ways.
+    ///
+    /// # Panics
+    /// Unless there are as many `blocked` as `rays`.
+    pub fn any_hits(
+        &self,
+        rays: &[Ray],
+        blocked: &mut [bool],
+        accept: Option<&(impl Fn(usize, &Hit) -> bool + Sync)>,
+    ) {
+        assert_eq!(rays.len(), blocked.len());
+        let report = |i: usize, hit: Option<Hit>| blocked[i] = hit.is_some();
+        match accept {
+            None => self.batch::<_, _, true>(rays, All, report),
+            Some(accept) => self.batch::<_, _, true>(rays, Only(accept), report),
+        }
     }
 
+    fn batch<F: Filter, R: FnMut(usize, Option<Hit>), const ANY: bool>(
+        &self,
+        rays: &[Ray],
+        filter: F,
+        report: R,
+    ) {
+        Batch::<_, _, _, ANY> { target: self, rays, filter, report }.run(self.isa);
+    }
+}
+
+impl Target for Tlas {
+    const ONE_LEVEL: bool = false;
+
+    #[inline(always)]
+    fn nodes(&self) -> &[WideNode] {
+        &self.wide.nodes
+    }
+
+    #[inline(always)]
+    fn only(&self) -> Option<(&Blas, u32)> {
+        None
+    }
+
+    #[inline(always)]
     fn probe(&self, ray: &Ray) -> Probe {
-        Probe::with_slack(ray, &self.bvh.bounds(), self.slack)
+        Probe::with_slack(ray, &self.wide.bounds, self.slack)
+    }
+
+    #[inline(always)]
+    fn bounds(&self) -> (Aabb, f32) {
+        (self.wide.bounds, self.slack)
+    }
+
+    #[inline(always)]
+    fn enter(&self, entry: usize, ray: &Ray) -> (&Blas, u32, Option<Probe>) {
+        let instance = self.wide.prims[entry];
+        let placement = &self.placements[instance as usize];
+        let blas = &*placement.blas;
+        let local = (!placement.identity).then(|| Probe::new(&placement.local(ray), &blas.bounds()));
+        (blas, instance, local)
+    }
+
+    #[inline(always)]
+    fn traverse_packet<S: Simd, F: Filter, const ANY: bool>(
+        &self,
+        simd: S,
+        scratch: &mut Scratch,
+        rays: u64,
+        filter: F,
+    ) -> u64 {
+        let Scratch { packet, found, waiting, numbers, inner } = scratch;
+        let inner = inner.get_or_insert_with(Scratch::new);
+        let mut visitor = Instances::<F, ANY> { tlas: self, found, numbers, filter, inner };
+        self.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor)
+    }
+}
+
+/// The instances, asked for by a packet.
+struct Instances<'a, F, const ANY: bool> {
+    tlas: &'a Tlas,
+    found: &'a mut Found,
+    numbers: &'a [usize; PACKET],
+    filter: F,
+    inner: &'a mut Scratch,
+}
+
+impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
+    /// Takes rays through one instance.
+    #[inline(always)]
+    fn instance<S: Simd>(&mut self, simd: S, packet: &mut Packet, instance: u32, rays: u64) -> u64 {
+        let placement = &self.tlas.placements[instance as usize];
+        let blas = &*placement.blas;
+        let Scratch { packet: local, found, waiting, numbers, .. } = &mut *self.inner;
+        if placement.identity {
+            let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
+            let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
+            return blas.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor);
+        }
+        let mut lanes = [0; PACKET];
+        let mut moved = [Ray::new(Vec3::ZERO, Vec3::ZERO); PACKET];
+        let mut count = 0;
+        for lane in each(rays) {
+            lanes[count % PACKET] = lane;
+            moved[count % PACKET] = placement.local(&packet.ray(lane));
+            count += 1;
+        }
+        let mut done = 0;
+        for (class, members) in Classes::of(&moved[..count.min(PACKET)]) {
+            let mut these = [0; PACKET];
+            let mut count = 0;
+            for member in each(members) {
+                these[count % PACKET] = member;
+                numbers[count % PACKET] = self.numbers[lanes[member % PACKET] % PACKET];
+                count += 1;
+            }
+            local.prepare(simd, class, count, |i| moved[these[i % PACKET] % PACKET], &blas.bounds(), 1.0);
+            found.rays = 0;
+            for (i, &member) in these[..count.min(PACKET)].iter().enumerate() {
+                found.copy(i, self.found, lanes[member % PACKET]);
+            }
+            let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter: self.filter };
+            let ended = blas.wide.traverse_packet(simd, local, lowest(count), waiting, &mut visitor);
+            for (i, &member) in these[..count.min(PACKET)].iter().enumerate() {
+                let lane = lanes[member % PACKET];
+                self.found.copy(lane, found, i);
+                packet.t_max.0[lane % PACKET] = local.t_max.0[i % PACKET];
+                done |= (ended >> i & 1) << lane;
+            }
+        }
+        done
+    }
+}
+
+impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
+    #[inline(always)]
+    fn many(&mut self, simd: S, packet: &mut Packet, first: usize, count: usize, rays: u64) -> u64 {
+        let tlas = self.tlas;
+        let mut done = 0;
+        for &instance in &tlas.wide.prims[first..first + count] {
+            if rays & !done != 0 {
+                done |= self.instance(simd, packet, instance, rays & !done);
+            }
+        }
+        done
+    }
+
+    #[inline(always)]
+    fn one(
+        &mut self,
+        simd: S,
+        packet: &mut Packet,
+        probe: &Probe,
+        lane: usize,
+        first: usize,
+        count: usize,
+    ) -> ControlFlow<(), f32> {
+        let tlas = self.tlas;
+        for &instance in &tlas.wide.prims[first..first + count] {
+            let placement = &tlas.placements[instance as usize];
+            let blas = &*placement.blas;
+            let local = (!placement.identity)
+                .then(|| Probe::new(&placement.local(&packet.ray(lane)), &blas.bounds()));
+            let probe = local.as_ref().unwrap_or(probe);
+            let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
+            let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
+            let waiting: &mut Waiting = &mut self.inner.waiting.single;
+            let t_max = packet.t_max.0[lane % PACKET];
+            blas.wide.traverse(simd, probe, 0, t_max, waiting, |first, count, _| {
+                visitor.one(simd, packet, probe, lane, first, count)
+            })?;
+        }
+        ControlFlow::Continue(packet.t_max.0[lane % PACKET])
     }
 }

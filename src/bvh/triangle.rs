@@ -3,7 +3,8 @@
 //! Reference: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013.
 
 use super::Probe;
-use super::simd::{Lanes, Mask, One, Plain};
+use super::probe::AXES;
+use super::simd::{Lanes, Mask, One, Plain, three};
 use glam::{DVec3, Vec3};
 
 /// Intersection of a [`Probe`] with a triangle.
@@ -20,7 +21,7 @@ pub struct TriangleHit {
 /// A hit nearer than this part of the farthest corner's distance is measured again in double precision.
 const CANCELLATION: f32 = 0.25;
 /// A hit farther behind the origin than this part of it is surely behind.
-pub(super) const BEHIND: f32 = -1.0 / 1024.0;
+const BEHIND: f32 = -1.0 / 1024.0;
 
 /// A ray, or several, along whose largest direction component space is sheared; coordinates in the order
 /// of [`Probe`]'s `axes`.
@@ -46,7 +47,9 @@ pub(super) struct Distance<V: Lanes> {
     pub inverse_determinant: V,
     /// Of the farthest corner, in multiples of the direction.
     pub reach: V,
-    /// Not to be trusted: an edge or the triangle's plane has to be looked at in double precision.
+    /// In front and far enough for `t` to be trusted, unless also doubtful.
+    pub ahead: V::Mask,
+    /// An edge or the triangle's plane has to be looked at in double precision.
     pub doubtful: V::Mask,
 }
 
@@ -67,15 +70,17 @@ impl<V: Lanes> Shear<V> {
     #[inline(always)]
     pub fn distance(&self, proof: V::Proof, edges: &Edges<V>) -> Distance<V> {
         let [u, v, w] = edges.weights;
-        let [a, b, c] = edges.depths.map(|z| self.shear[2] * z);
+        let [a, b, c] = three(|i| self.shear[2] * edges.depths[i]);
         let zero = V::splat(proof, 0.0);
         let determinant = u + v + w;
         let t = (u * a + v * b + w * c) / determinant;
         let on_edge = u.eq(zero).or(v.eq(zero)).or(w.eq(zero));
         let reach = a.abs().max(b.abs()).max(c.abs());
-        let cancels = t.le(reach * V::splat(proof, CANCELLATION));
+        let cancels = reach * V::splat(proof, CANCELLATION);
+        let surely_behind = reach * V::splat(proof, BEHIND);
         let inverse_determinant = V::splat(proof, 1.0) / determinant;
-        Distance { t, inverse_determinant, reach, doubtful: on_edge.or(cancels) }
+        let doubtful = on_edge.or(t.le(cancels).and(surely_behind.le(t)));
+        Distance { t, inverse_determinant, reach, ahead: cancels.lt(t), doubtful }
     }
 }
 
@@ -101,8 +106,9 @@ impl Probe {
             return self.extreme_triangle(corners, t_max);
         }
         let one = |x: f32| One::splat(Plain, x);
-        let permuted = |p: Vec3| self.axes.map(|axis| one(p[axis]));
-        let shear = Shear { origin: permuted(self.origin), shear: self.shear.to_array().map(one) };
+        let [x, y, z] = AXES[self.axis];
+        let permuted = |p: Vec3| [one(p[x]), one(p[y]), one(p[z])];
+        let shear = Shear { origin: self.sheared_origin.to_array().map(one), shear: self.shear.to_array().map(one) };
         let mut edges = shear.edges(corners.map(permuted));
         if !edges.inside(Plain) {
             return None;
@@ -128,7 +134,7 @@ impl Probe {
     /// `None` if the ray passes outside, or in the plane.
     #[cold]
     fn exact_weights(&self, corners: &[Vec3; 3]) -> Option<[f32; 3]> {
-        let [x, y, z] = self.axes;
+        let [x, y, z] = AXES[self.axis];
         let [a, b, c] = corners.map(|p| {
             let p = p - self.origin;
             (f64::from(p[x] - self.shear.x * p[z]), f64::from(p[y] - self.shear.y * p[z]))
@@ -153,7 +159,7 @@ impl Probe {
     /// The same in double precision, for coordinates whose products overflow or vanish.
     #[cold]
     fn extreme_triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
-        let [x, y, z] = self.axes;
+        let [x, y, z] = AXES[self.axis];
         let shear = self.shear.as_dvec3();
         let [a, b, c] = corners.map(|p| {
             let p = p.as_dvec3() - self.origin.as_dvec3();

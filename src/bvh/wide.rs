@@ -5,7 +5,7 @@
 //! GPUs Through Compressed Wide BVHs", HPG 2017, section 3.
 
 use super::build::MAX_DEPTH;
-use super::{Aabb, Bvh, Node};
+use super::{Aabb, Bvh, Defect, Node};
 use glam::Vec3;
 
 /// Children of a node.
@@ -61,7 +61,7 @@ impl Child {
         Self::Leaf { first: first as usize, count: count as usize }
     }
 
-    fn pack(self) -> u32 {
+    pub(super) fn pack(self) -> u32 {
         match self {
             Self::Node(index) => index as u32,
             Self::Leaf { first, count } => LEAF | (count as u32 - 1) << FIRST_BITS | first as u32,
@@ -291,6 +291,51 @@ impl WideNode {
             });
             slots.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             *order = slots.iter().enumerate().fold(0, |order, (i, &(_, slot))| order | slot << (3 * i));
+        }
+    }
+}
+
+impl WideBvh {
+    /// Checks everything that a traversal relies on. Where each primitive is in one leaf, whole, `boxes` are
+    /// what the hierarchy was built over, and must be inside their leaves too; else none.
+    ///
+    /// # Errors
+    /// The first defect found.
+    pub fn check(&self, boxes: Option<&[Aabb]>) -> Result<(), Defect> {
+        let mut times = vec![0; boxes.map_or(0, <[Aabb]>::len)];
+        let mut stack = if self.nodes.is_empty() { Vec::new() } else { vec![(0, 1, self.bounds)] };
+        while let Some((index, depth, around)) = stack.pop() {
+            if depth > MAX_DEPTH {
+                return Err(Defect::TooDeep { node: index as u32, depth });
+            }
+            let dangling = Defect::Dangling { node: index as u32 };
+            let node = self.nodes.get(index).ok_or(dangling)?;
+            for slot in 0..WIDTH {
+                let bounds = node.child_bounds(slot);
+                if bounds.is_empty() {
+                    continue;
+                }
+                if !around.contains(&bounds) {
+                    return Err(Defect::ChildOutsideParent { parent: index as u32, child: slot as u32 });
+                }
+                match Child::unpack(node.children[slot]) {
+                    Child::Node(child) if child > index => stack.push((child, depth + 1, bounds)),
+                    Child::Node(_) => return Err(dangling),
+                    Child::Leaf { first, count } => {
+                        for &prim in self.prims.get(first..first + count).ok_or(dangling)? {
+                            let Some(boxes) = boxes else { continue };
+                            if !bounds.contains(boxes.get(prim as usize).ok_or(dangling)?) {
+                                return Err(Defect::PrimOutsideLeaf { leaf: index as u32, prim });
+                            }
+                            times[prim as usize] += 1;
+                        }
+                    }
+                }
+            }
+        }
+        match times.iter().position(|&t| t != 1) {
+            Some(prim) => Err(Defect::NotOnce { prim: prim as u32, times: times[prim] }),
+            None => Ok(()),
         }
     }
 }

@@ -56,6 +56,10 @@ pub struct Batch {
     paths: Vec<Path>,
     next: Vec<Path>,
     shadows: Vec<Shadow>,
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    ignored: Vec<Option<(u32, u32)>>,
+    blocked: Vec<bool>,
     radiance: Vec<Vec3>,
     keys: Vec<(u32, u32)>,
 }
@@ -119,22 +123,38 @@ impl Batch {
     fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
         self.next.clear();
         self.shadows.clear();
+        self.rays.clear();
+        self.rays.extend(self.paths.iter().map(|path| path.ray));
+        self.hits.resize(self.rays.len(), None);
+        let paths = &self.paths;
+        let random = |i: usize, key: u32| paths[i].sampler.hashed(key ^ paths[i].depth);
+        scene.closest_hits(&self.rays, &mut self.hits, random);
         for i in 0..self.paths.len() {
             let path = self.paths[i];
-            let hit = scene.closest_hit(&path.ray, |key| path.sampler.hashed(key ^ path.depth));
-            self.arrive(scene, &path, hit);
+            self.arrive(scene, &path, self.hits[i]);
         }
-        rays.shadow += self.shadows.len() as u64;
-        for shadow in &self.shadows {
-            let random = |key| shadow.sampler.hashed(key ^ shadow.key);
-            let blocked = scene.lights.blocks(&shadow.ray, shadow.light)
-                || scene.any_hit(&shadow.ray, shadow.triangle, random);
-            if !blocked {
-                self.radiance[shadow.entry as usize] += shadow.contribution;
-            }
-        }
+        rays.shadow += self.connect_lights(scene);
         rays.bounce += self.next.len() as u64;
         std::mem::swap(&mut self.paths, &mut self.next);
+    }
+
+    /// Adds the light of those queued shadow rays that nothing blocks; returns how many were traced.
+    fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
+        self.shadows.retain(|shadow| !scene.lights.blocks(&shadow.ray, shadow.light));
+        // Rays to one light go similar ways. Stable: the sum of a path does not depend on its neighbours.
+        self.shadows.sort_by_key(|shadow| shadow.light);
+        self.rays.clear();
+        self.rays.extend(self.shadows.iter().map(|shadow| shadow.ray));
+        self.ignored.clear();
+        self.ignored.extend(self.shadows.iter().map(|shadow| shadow.triangle));
+        self.blocked.resize(self.rays.len(), false);
+        let shadows = &self.shadows;
+        let random = |i: usize, key: u32| shadows[i].sampler.hashed(key ^ shadows[i].key);
+        scene.any_hits(&self.rays, &mut self.blocked, &self.ignored, random);
+        for (shadow, _) in self.shadows.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
+            self.radiance[shadow.entry as usize] += shadow.contribution;
+        }
+        self.shadows.len() as u64
     }
 
     /// What the end of a path's ray sends back along it, and where it goes on.

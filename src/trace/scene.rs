@@ -109,28 +109,32 @@ impl<'a> TraceScene<'a> {
         lookup(texture, filter, uv_transform.transform_point2(uv))
     }
 
-    /// The nearest hit that is there: what alpha lets through is not. `random` in [0, 1) decides about
-    /// partial coverage, as a function of the hit's key.
-    #[must_use]
-    pub fn closest_hit(&self, ray: &Ray, random: impl Fn(u32) -> f32) -> Option<Hit> {
-        if self.surfaces.has_alpha {
-            self.geometry.tlas.closest_accepted(ray, |hit| self.covers(hit, &random))
-        } else {
-            self.geometry.tlas.closest_hit(ray)
-        }
+    /// For each ray the nearest hit that is there: what alpha lets through is not. `random` in [0, 1)
+    /// decides about partial coverage, as a function of the ray's number and the hit's key.
+    pub fn closest_hits(
+        &self,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+        random: impl Fn(usize, u32) -> f32 + Sync,
+    ) {
+        let covers = |ray: usize, hit: &Hit| self.covers(hit, |key| random(ray, key));
+        self.geometry.tlas.closest_hits(rays, hits, self.surfaces.has_alpha.then_some(&covers));
     }
 
-    /// Whether something is there, not counting triangle `ignored` = (instance, triangle).
-    #[must_use]
-    pub fn any_hit(&self, ray: &Ray, ignored: Option<(u32, u32)>, random: impl Fn(u32) -> f32) -> bool {
-        let counts = |hit: &Hit| ignored != Some((hit.instance, hit.triangle));
-        if self.surfaces.has_alpha {
-            self.geometry.tlas.any_accepted(ray, |hit| counts(hit) && self.covers(hit, &random))
-        } else if ignored.is_some() {
-            self.geometry.tlas.any_accepted(ray, counts)
-        } else {
-            self.geometry.tlas.any_hit(ray)
-        }
+    /// For each ray whether something is there, not counting the triangle `ignored` of it, (instance,
+    /// triangle).
+    pub fn any_hits(
+        &self,
+        rays: &[Ray],
+        blocked: &mut [bool],
+        ignored: &[Option<(u32, u32)>],
+        random: impl Fn(usize, u32) -> f32 + Sync,
+    ) {
+        let counts = |ray: usize, hit: &Hit| {
+            ignored[ray] != Some((hit.instance, hit.triangle)) && self.covers(hit, |key| random(ray, key))
+        };
+        let asked = self.surfaces.has_alpha || ignored.iter().any(Option::is_some);
+        self.geometry.tlas.any_hits(rays, blocked, asked.then_some(&counts));
     }
 
     fn covers(&self, hit: &Hit, random: impl Fn(u32) -> f32) -> bool {

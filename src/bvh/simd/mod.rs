@@ -13,6 +13,11 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+#[cfg(not(target_arch = "x86_64"))]
+pub use portable::prefetch;
+#[cfg(target_arch = "x86_64")]
+pub use x86::prefetch;
+
 pub use isa::{Isa, Job};
 pub use portable::{Narrow, One, Plain};
 
@@ -41,6 +46,21 @@ pub trait Lanes:
     fn splat(proof: Self::Proof, x: f32) -> Self;
     /// The first of `from`, which must be at least as many.
     fn load(proof: Self::Proof, from: &[f32]) -> Self;
+    /// Nine rows of `stride` floats, the corners' coordinates, in another order of the axes.
+    ///
+    /// # Panics
+    /// Unless each row has as many floats behind its start.
+    #[inline(always)]
+    fn load_corners(proof: Self::Proof, rows: &[f32], stride: usize, axes: &[usize; 3]) -> [[Self; 3]; 3] {
+        assert!(rows.len() >= 8 * stride + Self::N);
+        three(|corner| {
+            three(|i| {
+                let start = (3 * corner + axes[i] % 3) * stride;
+                // SAFETY: at most 8 strides are in front of it, so that `N` floats are left, as asserted.
+                Self::load(proof, unsafe { rows.get_unchecked(start..start + Self::N) })
+            })
+        })
+    }
     /// Into the first of `to`, which must be at least as many.
     fn store(self, to: &mut [f32]);
     /// The smaller of each pair.
@@ -82,4 +102,10 @@ pub trait Octet: Lanes {
         nears: &mut [f32; 8],
         waiting: &mut [u32; 8],
     ) -> usize;
+}
+
+/// `[f(0), f(1), f(2)]`; unlike `std::array::from_fn` surely compiled for its caller's instructions.
+#[inline(always)]
+pub fn three<T>(f: impl Fn(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
 }

@@ -35,6 +35,11 @@ pub struct Four(Vec4);
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<T>(pub(super) T, pub(super) T);
 
+/// There is nothing to ask for on this machine.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+pub fn prefetch<T>(_: &[T], _: usize) {}
+
 impl One {
     /// The float.
     #[inline(always)]
