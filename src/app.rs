@@ -4,7 +4,7 @@ use crate::image::develop::{Display, Picture, develop};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::propagate_transforms;
-use crate::sync::{self, MaterialNumbers, Redone, RenderOrigin};
+use crate::sync::{self, Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
     Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
@@ -105,6 +105,7 @@ impl App {
         world.init_resource::<Lights>();
         world.init_resource::<Viewpoint>();
         world.init_resource::<RenderOrigin>();
+        world.init_resource::<Instructions>();
         world.init_resource::<MaterialNumbers>();
         world.init_resource::<Redone>();
         world.add_schedule(frame_schedule());

@@ -1,5 +1,6 @@
 //! The command line: arguments in, wishes out.
 
+use crate::bvh::Isa;
 use crate::image::ToneMap;
 use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
@@ -102,6 +103,9 @@ pub struct SceneArgs {
     /// Threads to trace with; 0 = all
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
+    /// Instructions to trace with, instead of the machine's widest: scalar, sse2 (neon on ARM), avx2 or avx512
+    #[arg(long, value_name = "NAME", value_parser = isa)]
+    pub isa: Option<Isa>,
     /// direct = direct light, also in mirrors and through glass; path = global illumination
     #[arg(long, value_enum)]
     pub integrator: Option<IntegratorArg>,
@@ -214,6 +218,7 @@ impl SceneArgs {
                 ToneMapArg::Clip => ToneMap::Clip,
                 ToneMapArg::Neutral => ToneMap::Neutral,
             }),
+            isa: self.isa,
             camera: self.camera.clone(),
             pose: Pose {
                 position: self.camera_position,
@@ -223,6 +228,13 @@ impl SceneArgs {
             },
         }
     }
+}
+
+fn isa(text: &str) -> Result<Isa, String> {
+    Isa::named(text).ok_or_else(|| {
+        let names: Vec<&str> = Isa::available().into_iter().map(Isa::name).collect();
+        format!("this machine has {}", names.join(", "))
+    })
 }
 
 fn resolution(text: &str) -> Result<UVec2, String> {

@@ -1,11 +1,13 @@
 //! Arguments and a file → a world ready to make frames. The window and `render` both start here.
 
 use crate::app::{App, FrameBudget};
+use crate::bvh::Isa;
 use crate::image::develop::suggest_exposure;
 use crate::image::{Display, ToneMap};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Projection, Transform};
 use crate::trace::{Film, Integrator, RenderSettings};
+use crate::sync::Instructions;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2};
@@ -34,6 +36,8 @@ pub struct Wishes {
     pub tone_map: Option<ToneMap>,
     /// Which camera of the file, by name or by number from 0.
     pub camera: Option<String>,
+    /// Instructions to trace with.
+    pub isa: Option<Isa>,
     /// Changes to that camera.
     pub pose: Pose,
 }
@@ -109,6 +113,7 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);
     app.world.insert_resource(settings);
+    app.world.insert_resource(Instructions(wishes.isa.unwrap_or_default()));
     app.world.insert_resource(Film::new(settings.size, wishes.first_sample));
     let tone_map = wishes.tone_map.unwrap_or_default();
     app.world.insert_resource(Display { exposure: exposure.unwrap_or_default(), tone_map });

@@ -4,7 +4,7 @@ use crate::app::{FrameBudget, FrameStats};
 use crate::image::{Display, ImageError, save};
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
-use crate::trace::{Film, Integrator, RayCounts, RenderSettings};
+use crate::trace::{Film, Geometry, Integrator, RayCounts, RenderSettings};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -202,7 +202,7 @@ pub fn render(
         max_depth: settings.max_depth,
         seed: settings.seed,
         threads: rayon::current_num_threads(),
-        isa: "scalar",
+        isa: app.world.resource::<Geometry>().tlas.isa().name(),
         triangles: report.triangles,
         first_sample: job.wishes.first_sample,
         samples: stats.samples_per_pixel,

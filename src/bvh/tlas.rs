@@ -121,6 +121,12 @@ impl Tlas {
         Self { isa, ..self }
     }
 
+    /// The instructions it is traced with.
+    #[must_use]
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
     /// The hierarchy, to draw or measure.
     #[must_use]
     pub fn hierarchy(&self) -> &WideBvh {

@@ -1,6 +1,6 @@
 //! Meshes and instances → the two levels of the hierarchy.
 
-use super::{MaterialNumbers, Redone, RenderOrigin};
+use super::{Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::bvh::{Blas, Placement, Tlas};
 use crate::scene::{GlobalTransform, Instance, Mesh};
 use crate::trace::Geometry;
@@ -69,6 +69,7 @@ pub fn sync_geometry(
     mut redone: ResMut<Redone>,
     origin: Res<RenderOrigin>,
     numbers: Res<MaterialNumbers>,
+    instructions: Res<Instructions>,
     instances: Query<(Entity, &Instance, &GlobalTransform)>,
     meshes: Query<(&Mesh, &MeshBlas)>,
     changed: (
@@ -80,7 +81,7 @@ pub fn sync_geometry(
     let removed = removed.0.read().count() + removed.1.read().count();
     let unchanged = changed.0.is_empty() && changed.1.is_empty() && removed == 0;
     // Values of materials don't matter here, only which numbers they have.
-    if unchanged && !numbers.is_changed() {
+    if unchanged && !numbers.is_changed() && !instructions.is_changed() {
         return;
     }
     let mut placed: Vec<_> = instances.iter().collect();
@@ -97,6 +98,6 @@ pub fn sync_geometry(
             normal_matrix: render_from_local.matrix3.inverse().transpose(),
         });
     }
-    *geometry = Geometry { tlas: Tlas::build(placements), instances: data };
+    *geometry = Geometry { tlas: Tlas::build(placements).with_isa(instructions.0), instances: data };
     redone.tlas += 1;
 }

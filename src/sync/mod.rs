@@ -18,6 +18,7 @@ pub use geometry::{MeshBlas, build_blas, choose_origin, sync_geometry};
 pub use lights::sync_lights;
 pub use surfaces::{MaterialNumbers, sync_surfaces};
 
+use crate::bvh::Isa;
 use crate::scene::{ActiveCamera, Camera, GlobalTransform};
 use crate::trace::{Film, Geometry, Lights, RenderSettings, Surfaces, Viewpoint};
 use bevy_ecs::prelude::*;
@@ -39,6 +40,10 @@ impl RenderOrigin {
         placed
     }
 }
+
+/// What rays are traced with: the machine's widest, unless somebody wants another.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Instructions(pub Isa);
 
 /// How often each thing was redone: for the HUD and for the tests that hold the table above.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
 use crate::image::{Display, Picture};
 use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
 use crate::sync::Redone;
-use crate::trace::RenderSettings;
+use crate::trace::{Geometry, RenderSettings};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -239,6 +239,7 @@ fn status(app: &App) -> Status {
         size: settings.size,
         integrator: settings.integrator,
         filter: settings.filter,
+        isa: world.resource::<Geometry>().tlas.isa().name(),
     }
 }
 

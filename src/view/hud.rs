@@ -48,6 +48,8 @@ pub struct Status {
     pub integrator: Integrator,
     /// Texture filter, if not the file's.
     pub filter: Option<Filter>,
+    /// Instructions that rays are traced with.
+    pub isa: &'static str,
 }
 
 /// How much the status lines tell.
@@ -121,7 +123,7 @@ pub fn status_lines(level: Level, status: &Status, measured: Measured) -> Vec<St
             tone_map_name(status.tone_map),
             filter_name(status.filter),
         ));
-        lines.push(format!("key to picture {latency} ms   restarts {}", status.resets));
+        lines.push(format!("key to picture {latency} ms   restarts {}   {}", status.resets, status.isa));
     }
     lines
 }
@@ -310,6 +312,7 @@ mod tests {
             size: UVec2::new(320, 240),
             integrator: Integrator::Direct,
             filter: None,
+            isa: "scalar",
         }
     }
 
