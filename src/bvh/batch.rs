@@ -1,11 +1,15 @@
 //! Many rays: sorted into packets, and what is left walks alone.
 
 use super::leaves::Filter;
-use super::packet::{CLASSES, Class, Found, PACKET, Packet, PacketWaiting, Visitor, lowest};
-use super::simd::{Isa, Job, Simd};
+use super::found::Found;
+use super::packet::Packet;
+use super::rows::{PACKET, Rays, each, lowest};
+use super::simd::{Job, Simd};
+use super::together::{PacketWaiting, Visitor};
 use super::walk::walk;
 use super::wide::WideNode;
 use super::{Aabb, Blas, Hit, Probe, Ray};
+use std::cell::Cell;
 use std::ops::ControlFlow;
 
 /// Fewer rays of a class than this are not worth a packet.
@@ -44,6 +48,11 @@ pub(super) struct Scratch {
     pub numbers: [usize; PACKET],
     /// For rays in the space of an instance.
     pub inner: Option<Box<Scratch>>,
+}
+
+thread_local! {
+    /// Kept from batch to batch: clearing it would cost as much as tracing some hundred rays.
+    static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
 
 impl Scratch {
@@ -87,7 +96,7 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Triangles<'_, F, ANY> {
         first: usize,
         count: usize,
     ) -> ControlFlow<(), f32> {
-        let t_max = packet.t_max.0[lane % PACKET];
+        let t_max = packet.rays.t_max.0[lane % PACKET];
         let number = self.numbers[lane % PACKET];
         self.blas.leaves.test_one::<S, ANY>(simd, probe, (first, count), self.instance, t_max, |hit| {
             self.found.offer(packet, lane, hit, |hit| self.filter.takes(number, hit))
@@ -95,97 +104,66 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Triangles<'_, F, ANY> {
     }
 }
 
-/// Up to 64 rays by class.
-pub(super) struct Classes {
-    members: [u64; CLASSES],
-    present: u32,
-}
-
-impl Classes {
-    #[inline(always)]
-    pub fn of(rays: &[Ray]) -> Self {
-        let mut classes = Self { members: [0; CLASSES], present: 0 };
-        for (i, ray) in rays.iter().enumerate().take(PACKET) {
-            let class = Class::of(ray.direction);
-            classes.members[class.index() % CLASSES] |= 1 << i;
-            classes.present |= 1 << class.index();
-        }
-        classes
-    }
-}
-
-impl Iterator for Classes {
-    type Item = (Class, u64);
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<Self::Item> {
-        let class = (self.present != 0).then(|| Class::from_index(self.present.trailing_zeros()))?;
-        self.present &= self.present - 1;
-        Some((class, self.members[class.index() % CLASSES]))
-    }
-}
-
-/// The numbers of the set bits.
-#[inline(always)]
-pub(super) fn each(mut bits: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
-        bits &= bits - 1;
-        Some(lane)
-    })
-}
-
-/// Traces all of `rays` and reports each one's hit.
-pub(super) struct Batch<'a, T, F, R, const ANY: bool> {
+/// Traces `count` rays and reports each one's hit.
+pub(super) struct Batch<'a, T, F, G, R, const ANY: bool> {
     pub target: &'a T,
-    pub rays: &'a [Ray],
+    pub count: usize,
+    /// The ray of each number.
+    pub ray: G,
     pub filter: F,
     pub report: R,
 }
 
-impl<T: Target, F: Filter, R: FnMut(usize, Option<Hit>), const ANY: bool> Batch<'_, T, F, R, ANY> {
-    /// With the given instructions.
-    pub fn run(self, isa: Isa) {
-        isa.run(self);
-    }
-}
-
-impl<T: Target, F: Filter, R: FnMut(usize, Option<Hit>), const ANY: bool> Job for Batch<'_, T, F, R, ANY> {
+impl<T, F, G, R, const ANY: bool> Job for Batch<'_, T, F, G, R, ANY>
+where
+    T: Target,
+    F: Filter,
+    G: Fn(usize) -> Ray,
+    R: FnMut(usize, Option<Hit>),
+{
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { target, rays, filter, mut report } = self;
-        let mut alone: Vec<usize> = Vec::new();
-        if rays.len() < WORTH_A_PACKET as usize {
-            walk::<S, T, F, ANY>(simd, target, rays, 0..rays.len(), filter, report);
+        let Self { target, count, ray, filter, mut report } = self;
+        if count < WORTH_A_PACKET as usize {
+            walk::<S, T, F, ANY>(simd, target, &ray, 0..count, filter, report);
             return;
         }
+        let mut alone: Vec<usize> = Vec::new();
         let (bounds, slack) = target.bounds();
-        let mut scratch = Scratch::new();
-        for (chunk, members) in rays.chunks(PACKET).enumerate() {
-            for (class, lanes) in Classes::of(members) {
-                let mut count = 0;
-                for lane in each(lanes) {
-                    scratch.numbers[count % PACKET] = chunk * PACKET + lane;
-                    count += 1;
-                }
-                let numbers = &scratch.numbers;
-                if lanes.count_ones() < WORTH_A_PACKET {
-                    alone.extend_from_slice(&numbers[..count]);
+        let mut scratch = SCRATCH.take().unwrap_or_else(Scratch::new);
+        let mut loaded = Rays::blank();
+        for start in (0..count).step_by(PACKET) {
+            let members = PACKET.min(count - start);
+            loaded.load(members, |i| ray(start + i));
+            for (class, lanes) in loaded.classes(simd, members) {
+                let size = lanes.count_ones();
+                if size < WORTH_A_PACKET {
+                    alone.extend(each(lanes).map(|lane| start + lane));
                     continue;
                 }
-                scratch.packet.prepare(simd, class, count, |i| rays[numbers[i % PACKET]], &bounds, slack);
+                let size = size as usize;
+                if size == members {
+                    scratch.packet.rays.clone_from(&loaded);
+                } else {
+                    scratch.packet.rays.gather(&loaded, lanes);
+                }
+                for (number, lane) in scratch.numbers.iter_mut().zip(each(lanes)) {
+                    *number = start + lane;
+                }
+                scratch.packet.prepare(simd, class, size, &bounds, slack);
                 scratch.found.rays = 0;
-                let done = target.traverse_packet::<S, F, ANY>(simd, &mut scratch, lowest(count), filter);
+                let done = target.traverse_packet::<S, F, ANY>(simd, &mut scratch, lowest(size), filter);
                 if ANY {
                     scratch.found.rays |= done;
                 }
-                for (lane, &number) in scratch.numbers[..count].iter().enumerate() {
+                for (lane, &number) in scratch.numbers[..size].iter().enumerate() {
                     report(number, scratch.found.hit(&scratch.packet, lane));
                 }
             }
         }
-        walk::<S, T, F, ANY>(simd, target, rays, alone, filter, report);
+        SCRATCH.set(Some(scratch));
+        walk::<S, T, F, ANY>(simd, target, &ray, alone, filter, report);
     }
 }

@@ -93,8 +93,31 @@ impl Blas {
         self.batch::<_, true>(rays, |i, hit| blocked[i] = hit.is_some());
     }
 
+    /// [`Blas::closest_hits`] for rays that are made when they are needed: `count` of them, by number, each
+    /// reported once, in any order.
+    pub fn closest_hits_by(
+        &self,
+        count: usize,
+        ray: impl Fn(usize) -> Ray,
+        report: impl FnMut(usize, Option<Hit>),
+    ) {
+        self.isa.run(Batch::<_, _, _, _, false> { target: self, count, ray, filter: All, report });
+    }
+
+    /// [`Blas::any_hits`] likewise.
+    pub fn any_hits_by(
+        &self,
+        count: usize,
+        ray: impl Fn(usize) -> Ray,
+        mut report: impl FnMut(usize, bool),
+    ) {
+        let report = |i: usize, hit: Option<Hit>| report(i, hit.is_some());
+        self.isa.run(Batch::<_, _, _, _, true> { target: self, count, ray, filter: All, report });
+    }
+
     fn batch<R: FnMut(usize, Option<Hit>), const ANY: bool>(&self, rays: &[Ray], report: R) {
-        Batch::<_, _, _, ANY> { target: self, rays, filter: All, report }.run(self.isa);
+        let ray = |i: usize| rays[i];
+        self.isa.run(Batch::<_, _, _, _, ANY> { target: self, count: rays.len(), ray, filter: All, report });
     }
 }
 

@@ -1,7 +1,9 @@
 //! Triangles in the order of the leaves, laid out for vectors.
 
 use super::probe::AXES;
-use super::packet::{Found, GROUP, PACKET, Packet, lowest};
+use super::found::Found;
+use super::packet::Packet;
+use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, prefetch, three};
 use super::triangle::{Edges, Shear, TriangleHit};
 use super::wide::{Child, MAX_LEAF, WideBvh};
@@ -105,7 +107,7 @@ impl Leaves {
         let rows = &self.rows[first * 9..first * 9 + count * 9 + MAX_LEAF];
         let splat = |x: f32| S::F8::splat(simd, x);
         let mut candidates = lowest(count) as u32;
-        let mut certain = 0;
+        let (mut certain, mut near) = (0, 0);
         let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
         if !probe.extreme {
             let shear = Shear {
@@ -118,19 +120,22 @@ impl Leaves {
                 return ControlFlow::Continue(t_max);
             }
             let distance = shear.distance(simd, &edges);
-            let doubtful = distance.doubtful.bits();
-            certain = distance.ahead.and(distance.t.le(splat(t_max))).bits() & !doubtful;
-            candidates &= certain | doubtful;
+            let on_edge = distance.on_edge.bits();
+            certain = distance.ahead.and(distance.t.le(splat(t_max))).bits() & !on_edge;
+            near = distance.near.bits() & !on_edge;
+            candidates &= certain | near | on_edge;
             distance.t.store(&mut ts);
             (edges.weights[1] * distance.inverse_determinant).store(&mut us);
             (edges.weights[2] * distance.inverse_determinant).store(&mut vs);
         }
-        while candidates != 0 {
-            let i = candidates.trailing_zeros() as usize % MAX_LEAF;
-            candidates &= candidates - 1;
+        for i in each(u64::from(candidates)) {
+            let i = i % MAX_LEAF;
             let corners = Self::corners(rows, count, i);
+            let rough = TriangleHit { t: ts[i], u: us[i], v: vs[i] };
             let found = if certain >> i & 1 != 0 {
-                probe.clamped(&corners, ts[i], us[i], vs[i], t_max)
+                probe.clamped(&corners, rough.t, rough.u, rough.v, t_max)
+            } else if near >> i & 1 != 0 {
+                probe.near_triangle(&corners, rough, t_max)
             } else {
                 probe.triangle(&corners, t_max)
             };
@@ -184,41 +189,49 @@ impl Leaves {
                     continue;
                 }
                 let distance = shear.distance(simd, &edges);
-                let mut each = distance.doubtful.bits() & inside;
-                let mut certain = distance.ahead.bits() & inside & !each;
+                let mut on_edge = distance.on_edge.bits() & inside;
+                let mut certain = distance.ahead.bits() & inside & !on_edge;
+                let mut near = distance.near.bits() & inside & !on_edge;
                 if packet.extreme {
-                    (each, certain) = (members, 0);
+                    (on_edge, certain, near) = (members, 0, 0);
                 }
-                let (mut ts, mut us, mut vs) = ([0.0; GROUP], [0.0; GROUP], [0.0; GROUP]);
+                let t_max: S::F16 = packet.rays.t_max.get(simd, group);
+                let u = edges.weights[1] * distance.inverse_determinant;
+                let v = edges.weights[2] * distance.inverse_determinant;
+                let mut rough_t = distance.t;
+                let mut one_by_one = near | on_edge;
                 if certain != 0 {
                     let t = distance.t.max(packet.entry::<S>(simd, group, &corners));
-                    let t_max: S::F16 = packet.t_max.get(simd, group);
-                    let u = edges.weights[1] * distance.inverse_determinant;
-                    let v = edges.weights[2] * distance.inverse_determinant;
                     let closer = certain & t.lt(t_max).bits();
                     let equal = certain & t.eq(t_max).bits();
                     if ANY && F::ALL {
                         done |= u64::from(closer | equal) << base;
                     } else if F::ALL {
                         found.keep::<S>(simd, packet, group, closer, [t, u, v], triangle, instance);
-                        each |= equal;
+                        one_by_one |= equal;
                     } else {
-                        each |= closer | equal;
+                        one_by_one |= closer | equal;
                     }
-                    if each & certain != 0 {
-                        t.store(&mut ts);
-                        u.store(&mut us);
-                        v.store(&mut vs);
-                    }
+                    rough_t = S::F16::select(certain, t, rough_t);
                 }
-                while each != 0 {
-                    let k = each.trailing_zeros() as usize % GROUP;
-                    each &= each - 1;
+                if one_by_one == 0 {
+                    continue;
+                }
+                let (mut ts, mut us, mut vs) = ([0.0; GROUP], [0.0; GROUP], [0.0; GROUP]);
+                rough_t.store(&mut ts);
+                u.store(&mut us);
+                v.store(&mut vs);
+                for k in each(u64::from(one_by_one)) {
+                    let k = k % GROUP;
                     let lane = base + k;
+                    let rough = TriangleHit { t: ts[k], u: us[k], v: vs[k] };
+                    let t_max = packet.rays.t_max.0[lane % PACKET];
                     let hit = if certain >> k & 1 != 0 {
-                        Some(TriangleHit { t: ts[k], u: us[k], v: vs[k] })
+                        Some(rough)
+                    } else if near >> k & 1 != 0 {
+                        packet.probe(lane).near_triangle(&corners, rough, t_max)
                     } else {
-                        packet.probe(lane).triangle(&corners, packet.t_max.0[lane % PACKET])
+                        packet.probe(lane).triangle(&corners, t_max)
                     };
                     let Some(TriangleHit { t, u, v }) = hit else { continue };
                     let hit = Hit { t, u, v, triangle, instance };

@@ -1,8 +1,11 @@
 //! Top level: placed instances of bottom levels.
 
-use super::batch::{Batch, Classes, Scratch, Target, Triangles, each};
+use super::batch::{Batch, Scratch, Target, Triangles};
+use super::found::Found;
 use super::leaves::{All, Filter, Only};
-use super::packet::{Found, PACKET, Packet, Visitor, lowest};
+use super::packet::Packet;
+use super::rows::{PACKET, Rays, each, lowest};
+use super::together::Visitor;
 use super::simd::{Isa, Simd};
 use super::single::Waiting;
 use super::wide::{WideBvh, WideNode};
@@ -199,7 +202,8 @@ impl Tlas {
         filter: F,
         report: R,
     ) {
-        Batch::<_, _, _, ANY> { target: self, rays, filter, report }.run(self.isa);
+        let ray = |i: usize| rays[i];
+        self.isa.run(Batch::<_, _, _, _, ANY> { target: self, count: rays.len(), ray, filter, report });
     }
 }
 
@@ -271,34 +275,29 @@ impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
             return blas.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor);
         }
+        let mut moved = Rays::blank();
         let mut lanes = [0; PACKET];
-        let mut moved = [Ray::new(Vec3::ZERO, Vec3::ZERO); PACKET];
-        let mut count = 0;
-        for lane in each(rays) {
-            lanes[count % PACKET] = lane;
-            moved[count % PACKET] = placement.local(&packet.ray(lane));
-            count += 1;
+        for (to, lane) in lanes.iter_mut().zip(each(rays)) {
+            *to = lane;
         }
+        let count = rays.count_ones() as usize;
+        moved.load(count, |i| placement.local(&packet.rays.get(lanes[i % PACKET])));
         let mut done = 0;
-        for (class, members) in Classes::of(&moved[..count.min(PACKET)]) {
-            let mut these = [0; PACKET];
-            let mut count = 0;
-            for member in each(members) {
-                these[count % PACKET] = member;
-                numbers[count % PACKET] = self.numbers[lanes[member % PACKET] % PACKET];
-                count += 1;
-            }
-            local.prepare(simd, class, count, |i| moved[these[i % PACKET] % PACKET], &blas.bounds(), 1.0);
+        for (class, members) in moved.classes(simd, count) {
+            local.rays.gather(&moved, members);
+            local.prepare(simd, class, members.count_ones() as usize, &blas.bounds(), 1.0);
             found.rays = 0;
-            for (i, &member) in these[..count.min(PACKET)].iter().enumerate() {
-                found.copy(i, self.found, lanes[member % PACKET]);
+            for (i, member) in each(members).enumerate() {
+                let lane = lanes[member % PACKET];
+                numbers[i % PACKET] = self.numbers[lane % PACKET];
+                found.copy(i, self.found, lane);
             }
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter: self.filter };
-            let ended = blas.wide.traverse_packet(simd, local, lowest(count), waiting, &mut visitor);
-            for (i, &member) in these[..count.min(PACKET)].iter().enumerate() {
+            let ended = blas.wide.traverse_packet(simd, local, lowest(members.count_ones() as usize), waiting, &mut visitor);
+            for (i, member) in each(members).enumerate() {
                 let lane = lanes[member % PACKET];
                 self.found.copy(lane, found, i);
-                packet.t_max.0[lane % PACKET] = local.t_max.0[i % PACKET];
+                packet.rays.t_max.0[lane % PACKET] = local.rays.t_max.0[i % PACKET];
                 done |= (ended >> i & 1) << lane;
             }
         }
@@ -334,16 +333,16 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
             let placement = &tlas.placements[instance as usize];
             let blas = &*placement.blas;
             let local = (!placement.identity)
-                .then(|| Probe::new(&placement.local(&packet.ray(lane)), &blas.bounds()));
+                .then(|| Probe::new(&placement.local(&packet.rays.get(lane)), &blas.bounds()));
             let probe = local.as_ref().unwrap_or(probe);
             let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
             let waiting: &mut Waiting = &mut self.inner.waiting.single;
-            let t_max = packet.t_max.0[lane % PACKET];
+            let t_max = packet.rays.t_max.0[lane % PACKET];
             blas.wide.traverse(simd, probe, 0, t_max, waiting, |first, count, _| {
                 visitor.one(simd, packet, probe, lane, first, count)
             })?;
         }
-        ControlFlow::Continue(packet.t_max.0[lane % PACKET])
+        ControlFlow::Continue(packet.rays.t_max.0[lane % PACKET])
     }
 }

@@ -47,10 +47,12 @@ pub(super) struct Distance<V: Lanes> {
     pub inverse_determinant: V,
     /// Of the farthest corner, in multiples of the direction.
     pub reach: V,
-    /// In front and far enough for `t` to be trusted, unless also doubtful.
+    /// In front, and far enough for `t` to be trusted.
     pub ahead: V::Mask,
-    /// An edge or the triangle's plane has to be looked at in double precision.
-    pub doubtful: V::Mask,
+    /// So near that `t` has to be measured again.
+    pub near: V::Mask,
+    /// Exactly through an edge, as far as single precision can tell: nothing is known.
+    pub on_edge: V::Mask,
 }
 
 impl<V: Lanes> Shear<V> {
@@ -79,8 +81,8 @@ impl<V: Lanes> Shear<V> {
         let cancels = reach * V::splat(proof, CANCELLATION);
         let surely_behind = reach * V::splat(proof, BEHIND);
         let inverse_determinant = V::splat(proof, 1.0) / determinant;
-        let doubtful = on_edge.or(t.le(cancels).and(surely_behind.le(t)));
-        Distance { t, inverse_determinant, reach, ahead: cancels.lt(t), doubtful }
+        let near = t.le(cancels).and(surely_behind.le(t));
+        Distance { t, inverse_determinant, reach, ahead: cancels.lt(t), near, on_edge }
     }
 }
 
@@ -130,6 +132,18 @@ impl Probe {
         self.clamped(corners, t, (v * inverse).get(), (w * inverse).get(), t_max)
     }
 
+    /// The end of [`Probe::triangle`] for a near hit whose barycentrics are known.
+    #[inline(always)]
+    pub(super) fn near_triangle(
+        &self,
+        corners: &[Vec3; 3],
+        rough: TriangleHit,
+        t_max: f32,
+    ) -> Option<TriangleHit> {
+        let t = self.plane_distance(corners).unwrap_or(rough.t);
+        self.clamped(corners, t, rough.u, rough.v, t_max)
+    }
+
     /// The edge functions of the sheared corners in double precision, where their products are exact;
     /// `None` if the ray passes outside, or in the plane.
     #[cold]
@@ -149,6 +163,7 @@ impl Probe {
     ///
     /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to
     /// the origin of the ray that is not enough: a ray that starts on a large triangle would hit it.
+    #[inline(always)]
     fn plane_distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
         let [a, b, c] = corners.map(Vec3::as_dvec3);
         let normal = (b - a).cross(c - a);

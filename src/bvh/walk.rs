@@ -31,12 +31,12 @@ struct Walker<'a> {
     waiting: Waiting,
 }
 
-/// Traces `rays[number]` for each of `numbers` and reports the hit.
+/// Traces `ray(number)` for each of `numbers` and reports the hit.
 #[inline(always)]
 pub(super) fn walk<S: Simd, T: Target, F: Filter, const ANY: bool>(
     simd: S,
     target: &T,
-    rays: &[Ray],
+    ray: &impl Fn(usize) -> Ray,
     numbers: impl IntoIterator<Item = usize>,
     filter: F,
     mut report: impl FnMut(usize, Option<Hit>),
@@ -44,7 +44,7 @@ pub(super) fn walk<S: Simd, T: Target, F: Filter, const ANY: bool>(
     let mut numbers = numbers.into_iter();
     let mut walkers: Vec<Walker> = Vec::with_capacity(WALKERS);
     for number in numbers.by_ref().take(WALKERS) {
-        let mut walker = Walker::new(target, number, rays[number]);
+        let mut walker = Walker::new(target, number, ray(number));
         walker.start(simd, target);
         walkers.push(walker);
     }
@@ -59,7 +59,7 @@ pub(super) fn walk<S: Simd, T: Target, F: Filter, const ANY: bool>(
             report(walker.number, walker.best);
             if let Some(number) = numbers.next() {
                 walker.number = number;
-                walker.ray = rays[number];
+                walker.ray = ray(number);
                 walker.world = target.probe(&walker.ray);
                 walker.start(simd, target);
                 i += 1;

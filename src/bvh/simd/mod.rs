@@ -75,6 +75,12 @@ pub trait Lanes:
     fn lt(self, other: Self) -> Self::Mask;
     /// Equal.
     fn eq(self, other: Self) -> Self::Mask;
+    /// The least of all.
+    fn lowest(self) -> f32;
+    /// The greatest of all.
+    fn highest(self) -> f32;
+    /// The sign bits, the first lane's lowest; set for -0 too.
+    fn signs(self) -> u32;
     /// `a` where the bit is set, else `b`; the lowest bit is for the first lane.
     fn select(bits: u32, a: Self, b: Self) -> Self;
 }

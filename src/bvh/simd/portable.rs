@@ -132,6 +132,18 @@ impl Lanes for One {
         self.0 == other.0
     }
     #[inline(always)]
+    fn lowest(self) -> f32 {
+        self.0
+    }
+    #[inline(always)]
+    fn highest(self) -> f32 {
+        self.0
+    }
+    #[inline(always)]
+    fn signs(self) -> u32 {
+        u32::from(self.0.is_sign_negative())
+    }
+    #[inline(always)]
     fn select(bits: u32, a: Self, b: Self) -> Self {
         if bits & 1 != 0 { a } else { b }
     }
@@ -192,6 +204,18 @@ impl Lanes for Four {
     #[inline(always)]
     fn eq(self, other: Self) -> BVec4A {
         self.0.cmpeq(other.0)
+    }
+    #[inline(always)]
+    fn lowest(self) -> f32 {
+        self.0.min_element()
+    }
+    #[inline(always)]
+    fn highest(self) -> f32 {
+        self.0.max_element()
+    }
+    #[inline(always)]
+    fn signs(self) -> u32 {
+        self.0.is_negative_bitmask()
     }
     #[inline(always)]
     fn select(bits: u32, a: Self, b: Self) -> Self {
@@ -262,6 +286,18 @@ macro_rules! pair_lanes {
             #[inline(always)]
             fn eq(self, other: Self) -> Self::Mask {
                 PairMask(self.0.eq(other.0), self.1.eq(other.1))
+            }
+            #[inline(always)]
+            fn lowest(self) -> f32 {
+                self.0.min(self.1).lowest()
+            }
+            #[inline(always)]
+            fn highest(self) -> f32 {
+                self.0.max(self.1).highest()
+            }
+            #[inline(always)]
+            fn signs(self) -> u32 {
+                self.0.signs() | self.1.signs() << $n
             }
             #[inline(always)]
             fn select(bits: u32, a: Self, b: Self) -> Self {

@@ -114,7 +114,7 @@ operators!(Sixteen: Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512
 macro_rules! lanes {
     (
         $name:ident, $n:literal, $proof:ident, $mask:ident;
-        $splat:ident $load:ident $store:ident $min:ident $max:ident $abs:expr;
+        $splat:ident $load:ident $store:ident $min:ident $max:ident $abs:expr, $lowest:expr, $highest:expr, $signs:expr;
         |$a:ident, $b:ident| $le:expr, $lt:expr, $eq:expr;
         |$bits:ident| $select:expr
     ) => {
@@ -175,6 +175,24 @@ macro_rules! lanes {
                 unsafe { $eq }
             }
             #[inline(always)]
+            fn lowest(self) -> f32 {
+                let $a = self.0;
+                // SAFETY: whoever has a vector had the proof that makes it.
+                unsafe { $lowest }
+            }
+            #[inline(always)]
+            fn highest(self) -> f32 {
+                let $a = self.0;
+                // SAFETY: whoever has a vector had the proof that makes it.
+                unsafe { $highest }
+            }
+            #[inline(always)]
+            fn signs(self) -> u32 {
+                let $a = self.0;
+                // SAFETY: whoever has a vector had the proof that makes it.
+                unsafe { $signs }
+            }
+            #[inline(always)]
             fn select($bits: u32, a: Self, b: Self) -> Self {
                 let ($a, $b) = (a.0, b.0);
                 // SAFETY: whoever has a vector had the proof that makes it.
@@ -184,10 +202,24 @@ macro_rules! lanes {
     };
 }
 
+macro_rules! of_eight {
+    ($name:ident, $op:ident) => {
+        #[target_feature(enable = "avx2")]
+        fn $name(a: __m256) -> f32 {
+            let a = $op(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+            let a = $op(a, _mm_movehl_ps(a, a));
+            _mm_cvtss_f32($op(a, _mm_shuffle_ps::<1>(a, a)))
+        }
+    };
+}
+of_eight!(lowest_of_eight, _mm_min_ps);
+of_eight!(highest_of_eight, _mm_max_ps);
+
 lanes!(
     Eight, 8, Avx2, EightMask;
     _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_min_ps _mm256_max_ps
-    _mm256_andnot_ps(_mm256_set1_ps(-0.0), a);
+    _mm256_andnot_ps(_mm256_set1_ps(-0.0), a),
+    lowest_of_eight(a), highest_of_eight(a), _mm256_movemask_ps(a) as u32;
     |a, b|
     EightMask(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)),
     EightMask(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)),
@@ -201,7 +233,8 @@ lanes!(
 lanes!(
     EightVl, 8, Avx512, u8;
     _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_min_ps _mm256_max_ps
-    _mm256_andnot_ps(_mm256_set1_ps(-0.0), a);
+    _mm256_andnot_ps(_mm256_set1_ps(-0.0), a),
+    lowest_of_eight(a), highest_of_eight(a), _mm256_movemask_ps(a) as u32;
     |a, b|
     _mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b),
     _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
@@ -211,7 +244,8 @@ lanes!(
 lanes!(
     Sixteen, 16, Avx512, u16;
     _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_min_ps _mm512_max_ps
-    _mm512_abs_ps(a);
+    _mm512_abs_ps(a), _mm512_reduce_min_ps(a), _mm512_reduce_max_ps(a),
+    u32::from(_mm512_movepi32_mask(_mm512_castps_si512(a)));
     |a, b|
     _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b),
     _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),

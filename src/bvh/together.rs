@@ -1,0 +1,130 @@
+//! The loop of a packet through a hierarchy.
+
+use super::Probe;
+use super::packet::Packet;
+use super::rows::{PACKET, each};
+use super::simd::Simd;
+use super::single::Waiting;
+use super::wide::{Child, MAX_WAITING, WideBvh};
+use std::ops::ControlFlow;
+
+/// With no more rays than this left, each goes on alone.
+const FEW: u32 = 4;
+
+/// What a traversal does at leaves.
+pub(super) trait Visitor<S: Simd> {
+    /// Tests the `rays` (bits) of the packet with `count` entries from `first` on, shortening their
+    /// `t_max`; returns those that need no more.
+    fn many(&mut self, simd: S, packet: &mut Packet, first: usize, count: usize, rays: u64) -> u64;
+
+    /// The same for the ray of one lane, made ready; answers with the ray's new `t_max`.
+    fn one(&mut self, simd: S, packet: &mut Packet, probe: &Probe, lane: usize, first: usize, count: usize)
+    -> ControlFlow<(), f32>;
+}
+
+/// Children that a packet has yet to visit.
+#[derive(Debug)]
+pub(super) struct PacketWaiting {
+    pub nears: [f32; MAX_WAITING],
+    /// Node · 8 + number of the child.
+    pub children: [u32; MAX_WAITING],
+    /// The rays that entered the node.
+    pub rays: [u64; MAX_WAITING],
+    pub single: Waiting,
+}
+
+impl Default for PacketWaiting {
+    fn default() -> Self {
+        Self {
+            nears: [0.0; MAX_WAITING],
+            children: [0; MAX_WAITING],
+            rays: [0; MAX_WAITING],
+            single: Waiting::default(),
+        }
+    }
+}
+
+impl WideBvh {
+    /// Takes the `rays` of the packet through all leaves that any of them enters; returns those of which
+    /// the visitor said that they need no more.
+    #[inline(always)]
+    pub(super) fn traverse_packet<S: Simd>(
+        &self,
+        simd: S,
+        packet: &mut Packet,
+        rays: u64,
+        waiting: &mut PacketWaiting,
+        visitor: &mut impl Visitor<S>,
+    ) -> u64 {
+        if self.nodes.is_empty() {
+            return 0;
+        }
+        let lanes = 64 - rays.leading_zeros() as usize;
+        let mut alive = rays;
+        let mut t_bound = packet.t_bound(simd, lanes);
+        let mut count = 0;
+        let mut node = 0;
+        let mut entered = rays;
+        loop {
+            count += packet.enter(simd, &self.nodes[node], node, t_bound, entered, waiting, count);
+            loop {
+                if count == 0 {
+                    return rays & !alive;
+                }
+                count -= 1;
+                let rays = waiting.rays[count] & alive;
+                if rays == 0 || waiting.nears[count] > t_bound {
+                    continue;
+                }
+                let (parent, slot) = (waiting.children[count] as usize / 8, waiting.children[count] as usize % 8);
+                let parent = &self.nodes[parent];
+                match Child::unpack(parent.children[slot]) {
+                    Child::Node(child) => {
+                        let rays = packet.entering(simd, parent, slot, rays, true);
+                        if rays == 0 {
+                            continue;
+                        }
+                        if rays.count_ones() <= FEW {
+                            alive &= !self.each_alone(simd, packet, child, rays, &mut waiting.single, visitor);
+                            continue;
+                        }
+                        (node, entered) = (child, rays);
+                        break;
+                    }
+                    Child::Leaf { first, count } => {
+                        let rays = packet.entering(simd, parent, slot, rays, false);
+                        if rays != 0 {
+                            alive &= !visitor.many(simd, packet, first, count, rays);
+                            t_bound = packet.t_bound(simd, lanes);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes a few rays through the nodes below `root`, one after the other.
+    #[inline(always)]
+    fn each_alone<S: Simd>(
+        &self,
+        simd: S,
+        packet: &mut Packet,
+        root: usize,
+        rays: u64,
+        waiting: &mut Waiting,
+        visitor: &mut impl Visitor<S>,
+    ) -> u64 {
+        let mut done = 0;
+        for lane in each(rays) {
+            let probe = packet.probe(lane);
+            let t_max = packet.rays.t_max.0[lane % PACKET];
+            let end = self.traverse(simd, &probe, root, t_max, waiting, |first, count, _| {
+                visitor.one(simd, packet, &probe, lane, first, count)
+            });
+            if end.is_break() {
+                done |= 1 << lane;
+            }
+        }
+        done
+    }
+}
