@@ -6,14 +6,14 @@ use super::packet::Packet;
 use super::rows::{PACKET, Rays, each, lowest};
 use super::simd::{Job, Simd};
 use super::together::{PacketWaiting, Visitor};
-use super::walk::walk;
+use super::walk::Walk;
 use super::wide::WideNode;
 use super::{Aabb, Blas, Hit, Probe, Ray};
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
 /// Fewer rays of a class than this are not worth a packet.
-const WORTH_A_PACKET: u32 = 8;
+const WORTH_A_PACKET: u32 = 6;
 
 /// What rays can be traced through: one level or two.
 pub(super) trait Target: Sync {
@@ -127,7 +127,8 @@ where
     fn run<S: Simd>(self, simd: S) {
         let Self { target, count, ray, filter, mut report } = self;
         if count < WORTH_A_PACKET as usize {
-            walk::<S, T, F, ANY>(simd, target, &ray, 0..count, filter, report);
+            let numbers = 0..count;
+            simd.call(Walk::<_, _, _, _, _, ANY> { target, ray: &ray, numbers, filter, report: &mut report });
             return;
         }
         let mut alone: Vec<usize> = Vec::new();
@@ -164,6 +165,7 @@ where
             }
         }
         SCRATCH.set(Some(scratch));
-        walk::<S, T, F, ANY>(simd, target, &ray, alone, filter, report);
+        let report = &mut report;
+        simd.call(Walk::<_, _, _, _, _, ANY> { target, ray: &ray, numbers: alone, filter, report });
     }
 }

@@ -4,7 +4,7 @@ use super::probe::AXES;
 use super::found::Found;
 use super::packet::Packet;
 use super::rows::{GROUP, PACKET, each, lowest};
-use super::simd::{Lanes, Mask, Simd, prefetch, three};
+use super::simd::{Lanes, Mask, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit};
 use super::wide::{Child, MAX_LEAF, WideBvh};
 use super::{Hit, Probe};
@@ -78,10 +78,10 @@ impl Leaves {
         size_of_val(&*self.rows) + size_of_val(&*self.ids)
     }
 
-    /// Asks for a leaf to be brought near.
+    /// Nine floats for each.
     #[inline(always)]
-    pub fn prefetch(&self, first: usize) {
-        prefetch(&self.rows, first * 9);
+    pub fn triangles(&self) -> &[[f32; 9]] {
+        self.rows.as_chunks().0
     }
 
     /// A triangle of a leaf.

@@ -144,21 +144,19 @@ impl Packet {
         enter(0).max(enter(1)).max(enter(2).max(S::F16::splat(simd, 0.0)))
     }
 
-    /// Which rows of [`WideNode::bounds`] are the sides where the rays come in.
+    /// By which side of boxes the rays come in along an axis: 0 for the less, 1 for the greater.
     #[inline(always)]
-    fn near_rows(&self) -> [usize; 3] {
-        [self.octant & 1, 2 + (self.octant >> 1 & 1), 4 + (self.octant >> 2 & 1)]
+    fn near_side(&self, axis: usize) -> usize {
+        self.octant >> axis & 1
     }
 
     /// Which of `rays` enter a child. With `ranged`, the search ends with the first group of which a ray does;
     /// those behind it are taken along unasked.
     #[inline(always)]
     pub fn entering<S: Simd>(&self, simd: S, node: &WideNode, slot: usize, rays: u64, ranged: bool) -> u64 {
-        let rows = self.near_rows();
-        let near: [S::F16; 3] =
-            three(|axis| S::F16::splat(simd, node.bounds[rows[axis] % 6][slot % 8]));
-        let far: [S::F16; 3] =
-            three(|axis| S::F16::splat(simd, node.bounds[(rows[axis] ^ 1) % 6][slot % 8]));
+        let side = |axis: usize, side: usize| S::F16::splat(simd, node.bounds[axis][side][slot % WIDTH]);
+        let near = three(|axis| side(axis, self.near_side(axis)));
+        let far = three(|axis| side(axis, self.near_side(axis) ^ 1));
         let zero = S::F16::splat(simd, 0.0);
         let mut entering = rays;
         let mut rest = rays;
@@ -181,6 +179,7 @@ impl Packet {
         entering
     }
 
+    #[inline(always)]
     pub fn t_bound<S: Simd>(&self, simd: S, count: usize) -> f32 {
         let groups = count.div_ceil(GROUP);
         let most = (1..groups)
@@ -202,16 +201,15 @@ impl Packet {
         waiting: &mut PacketWaiting,
         count: usize,
     ) -> usize {
-        let rows = self.near_rows();
         let splat = |x: f32| S::F8::splat(simd, x);
-        let row = |row: usize| S::F8::load(simd, &node.bounds[row % 6]);
+        let side = |axis: usize, side: usize| S::F8::load(simd, &node.bounds[axis][side]);
         let enter = |axis: usize| {
-            let p = row(rows[axis]) - splat(self.first[axis]);
+            let p = side(axis, self.near_side(axis)) - splat(self.first[axis]);
             let [low, high] = [splat(self.inverse_span[axis][0]), splat(self.inverse_span[axis][1])];
             (p * low).min(p * high)
         };
         let leave = |axis: usize| {
-            let p = row(rows[axis] ^ 1) - splat(self.last[axis]);
+            let p = side(axis, self.near_side(axis) ^ 1) - splat(self.last[axis]);
             let [low, high] = [splat(self.inverse_span[axis][0]), splat(self.inverse_span[axis][1])];
             (p * low).max(p * high)
         };

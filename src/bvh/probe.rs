@@ -53,6 +53,7 @@ pub(super) fn is_extreme(reach: f32) -> bool {
 
 impl Probe {
     /// Prepares `ray` for boxes and triangles inside `bounds`.
+    #[inline(always)]
     #[must_use]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
         Self::with_slack(ray, bounds, 1.0)

@@ -1,7 +1,10 @@
 //! The loop of one ray through a hierarchy.
 
+use super::packet::Packet;
 use super::probe::Probe;
+use super::rows::PACKET;
 use super::simd::{Lanes, Octet, Simd, three};
+use super::together::Visitor;
 use super::wide::{Child, MAX_WAITING, WIDTH, WideBvh, WideNode};
 use std::ops::ControlFlow;
 
@@ -38,23 +41,24 @@ impl Waiting {
 }
 
 impl WideBvh {
-    /// Visits, roughly near before far, each leaf below node `root` whose box the ray enters at or before
-    /// `t_max`.
+    /// Takes one ray of a packet, made ready as `probe`, roughly near before far to each leaf below node
+    /// `root` whose box it enters at or before its `t_max`.
     ///
-    /// `visit` gets the leaf's first entry, their number and the current `t_max`, and answers
-    /// `Continue(t_max)`, shortened if it found something, or `Break` to stop.
+    /// Not with a closure for what to do there: that would be compiled apart, for the oldest machine.
     #[inline(always)]
-    pub(super) fn traverse<S: Simd, B>(
+    pub(super) fn traverse_one<S: Simd>(
         &self,
         simd: S,
+        packet: &mut Packet,
         probe: &Probe,
+        lane: usize,
         root: usize,
-        mut t_max: f32,
         waiting: &mut Waiting,
-        mut visit: impl FnMut(usize, usize, f32) -> ControlFlow<B, f32>,
-    ) -> ControlFlow<B> {
+        visitor: &mut impl Visitor<S>,
+    ) -> ControlFlow<()> {
         let boxes = Boxes::<S>::new(simd, probe);
         let Some(mut node) = self.nodes.get(root) else { return ControlFlow::Continue(()) };
+        let mut t_max = packet.rays.t_max.0[lane % PACKET];
         let mut count = 0;
         loop {
             count += boxes.enter(node, t_max, waiting, count);
@@ -70,7 +74,9 @@ impl WideBvh {
                             node = &self.nodes[index];
                             break;
                         }
-                        Child::Leaf { first, count } => t_max = visit(first, count, t_max)?,
+                        Child::Leaf { first, count } => {
+                            t_max = visitor.one(simd, packet, probe, lane, first, count)?;
+                        }
                     }
                 }
             }
@@ -79,13 +85,14 @@ impl WideBvh {
 }
 
 /// A ray made ready for eight boxes at once.
+#[derive(Clone, Copy)]
 pub(super) struct Boxes<S: Simd> {
     simd: S,
     near_origin: [S::F8; 3],
     far_origin: [S::F8; 3],
     inverse: [S::F8; 3],
-    /// Rows of the sides where the ray comes in.
-    near_rows: [usize; 3],
+    /// For each axis whether the ray comes in by the greater side, 1, or the less, 0.
+    near_side: [usize; 3],
     octant: usize,
 }
 
@@ -99,7 +106,7 @@ impl<S: Simd> Boxes<S> {
             near_origin: splat(probe.near_origin),
             far_origin: splat(probe.far_origin),
             inverse: splat(probe.inverse),
-            near_rows: [octant & 1, 2 + (octant >> 1 & 1), 4 + (octant >> 2 & 1)],
+            near_side: three(|axis| octant >> axis & 1),
             octant,
         }
     }
@@ -107,18 +114,29 @@ impl<S: Simd> Boxes<S> {
     /// Puts the children that the ray enters on top of the `count` waiting ones; returns how many.
     #[inline(always)]
     pub fn enter(&self, node: &WideNode, t_max: f32, waiting: &mut Waiting, count: usize) -> usize {
-        let side = |axis: usize, row: usize, origin: &[S::F8; 3]| {
-            (S::F8::load(self.simd, &node.bounds[row % 6]) - origin[axis]) * self.inverse[axis]
-        };
-        let near = |axis: usize| side(axis, self.near_rows[axis], &self.near_origin);
-        let far = |axis: usize| side(axis, self.near_rows[axis] ^ 1, &self.far_origin);
-        let zero = S::F8::splat(self.simd, 0.0);
-        let t_max = S::F8::splat(self.simd, t_max);
-        let entry = near(0).max(near(1)).max(near(2).max(zero));
-        let exit = far(0).min(far(1)).min(far(2).min(t_max));
-        let nears = (&mut waiting.nears[count..count + WIDTH]).try_into();
-        let children = (&mut waiting.children[count..count + WIDTH]).try_into();
-        let (Ok(nears), Ok(to)) = (nears, children) else { return 0 };
-        S::F8::push_entered(entry, exit, node.orders[self.octant % 8], &node.children, nears, to)
+        let entry = self.near(node, 0).max(self.near(node, 1)).max(self.near(node, 2));
+        let exit = self.far(node, 0).min(self.far(node, 1)).min(self.far(node, 2));
+        let entry = entry.max(S::F8::splat(self.simd, 0.0));
+        let exit = exit.min(S::F8::splat(self.simd, t_max));
+        // One check instead of one for each array.
+        assert!(count <= BOTH_LEVELS - WIDTH);
+        let nears = waiting.nears[count..].first_chunk_mut();
+        let children = waiting.children[count..].first_chunk_mut();
+        let (Some(nears), Some(to)) = (nears, children) else { return 0 };
+        S::F8::push_entered(entry, exit, node.orders[self.octant & 7], &node.children, nears, to)
+    }
+
+    /// Where the ray comes into each child's extent along an axis.
+    #[inline(always)]
+    fn near(&self, node: &WideNode, axis: usize) -> S::F8 {
+        let side = S::F8::load(self.simd, &node.bounds[axis][self.near_side[axis] & 1]);
+        (side - self.near_origin[axis]) * self.inverse[axis]
+    }
+
+    /// Where it leaves it.
+    #[inline(always)]
+    fn far(&self, node: &WideNode, axis: usize) -> S::F8 {
+        let side = S::F8::load(self.simd, &node.bounds[axis][self.near_side[axis] & 1 ^ 1]);
+        (side - self.far_origin[axis]) * self.inverse[axis]
     }
 }

@@ -338,10 +338,7 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
             let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
             let waiting: &mut Waiting = &mut self.inner.waiting.single;
-            let t_max = packet.rays.t_max.0[lane % PACKET];
-            blas.wide.traverse(simd, probe, 0, t_max, waiting, |first, count, _| {
-                visitor.one(simd, packet, probe, lane, first, count)
-            })?;
+            blas.wide.traverse_one(simd, packet, probe, lane, 0, waiting, &mut visitor)?;
         }
         ControlFlow::Continue(packet.rays.t_max.0[lane % PACKET])
     }

@@ -2,8 +2,8 @@
 
 use super::Probe;
 use super::packet::Packet;
-use super::rows::{PACKET, each};
-use super::simd::Simd;
+use super::rows::each;
+use super::simd::{Part, Simd};
 use super::single::Waiting;
 use super::wide::{Child, MAX_WAITING, WideBvh};
 use std::ops::ControlFlow;
@@ -85,7 +85,9 @@ impl WideBvh {
                             continue;
                         }
                         if rays.count_ones() <= FEW {
-                            alive &= !self.each_alone(simd, packet, child, rays, &mut waiting.single, visitor);
+                            let waiting = &mut waiting.single;
+                            let few = Few { hierarchy: self, packet, root: child, rays, waiting, visitor };
+                            alive &= !simd.call(few);
                             continue;
                         }
                         (node, entered) = (child, rays);
@@ -102,26 +104,28 @@ impl WideBvh {
             }
         }
     }
+}
 
-    /// Takes a few rays through the nodes below `root`, one after the other.
+/// A few rays of a packet, to be taken through the nodes below `root` one after the other.
+struct Few<'a, V> {
+    hierarchy: &'a WideBvh,
+    packet: &'a mut Packet,
+    root: usize,
+    rays: u64,
+    waiting: &'a mut Waiting,
+    visitor: &'a mut V,
+}
+
+impl<S: Simd, V: Visitor<S>> Part<S> for Few<'_, V> {
+    type Output = u64;
+
     #[inline(always)]
-    fn each_alone<S: Simd>(
-        &self,
-        simd: S,
-        packet: &mut Packet,
-        root: usize,
-        rays: u64,
-        waiting: &mut Waiting,
-        visitor: &mut impl Visitor<S>,
-    ) -> u64 {
+    fn run(self, simd: S) -> u64 {
+        let Self { hierarchy, packet, root, rays, waiting, visitor } = self;
         let mut done = 0;
         for lane in each(rays) {
             let probe = packet.probe(lane);
-            let t_max = packet.rays.t_max.0[lane % PACKET];
-            let end = self.traverse(simd, &probe, root, t_max, waiting, |first, count, _| {
-                visitor.one(simd, packet, &probe, lane, first, count)
-            });
-            if end.is_break() {
+            if hierarchy.traverse_one(simd, packet, &probe, lane, root, waiting, visitor).is_break() {
                 done |= 1 << lane;
             }
         }

@@ -55,17 +55,23 @@ pub(super) struct Distance<V: Lanes> {
     pub on_edge: V::Mask,
 }
 
+/// No fused multiply-add: an edge must give the negated value in the neighbouring triangle.
+#[inline(always)]
+fn edge<V: Lanes>(p: [V; 3], q: [V; 3]) -> V {
+    p[0] * q[1] - p[1] * q[0]
+}
+
 impl<V: Lanes> Shear<V> {
     #[inline(always)]
     pub fn edges(&self, corners: [[V; 3]; 3]) -> Edges<V> {
-        let moved = |p: [V; 3]| {
-            let [x, y, z] = [p[0] - self.origin[0], p[1] - self.origin[1], p[2] - self.origin[2]];
-            [x - self.shear[0] * z, y - self.shear[1] * z, z]
-        };
-        let [a, b, c] = [moved(corners[0]), moved(corners[1]), moved(corners[2])];
-        // No fused multiply-add: an edge must give the negated value in the neighbouring triangle.
-        let edge = |p: [V; 3], q: [V; 3]| p[0] * q[1] - p[1] * q[0];
+        let [a, b, c] = [self.moved(corners[0]), self.moved(corners[1]), self.moved(corners[2])];
         Edges { weights: [edge(c, b), edge(a, c), edge(b, a)], depths: [a[2], b[2], c[2]] }
+    }
+
+    #[inline(always)]
+    fn moved(&self, p: [V; 3]) -> [V; 3] {
+        let [x, y, z] = [p[0] - self.origin[0], p[1] - self.origin[1], p[2] - self.origin[2]];
+        [x - self.shear[0] * z, y - self.shear[1] * z, z]
     }
 
     /// Meant for lanes that are inside.

@@ -20,9 +20,9 @@ pub const MAX_WAITING: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub struct WideNode {
-    /// Rows of the children's least x, greatest x, least y, greatest y, least z and greatest z. A child that
-    /// is not there has an empty box, which nothing enters.
-    pub bounds: [[f32; WIDTH]; 6],
+    /// For x, y and z the children's least and their greatest. A child that is not there has an empty box,
+    /// which nothing enters.
+    pub bounds: [[[f32; WIDTH]; 2]; 3],
     /// What is there: see [`Child`].
     pub children: [u32; WIDTH],
     /// For each octant of directions (bit 0: x negative, bit 1: y, bit 2: z) the numbers of the children from
@@ -251,7 +251,7 @@ impl WideNode {
     const EMPTY: Self = Self {
         bounds: {
             let (min, max) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-            [min, max, min, max, min, max]
+            [[min, max]; 3]
         },
         children: [0; WIDTH],
         orders: [0; 8],
@@ -262,15 +262,15 @@ impl WideNode {
     pub fn child_bounds(&self, slot: usize) -> Aabb {
         let b = &self.bounds;
         Aabb {
-            min: Vec3::new(b[0][slot], b[2][slot], b[4][slot]),
-            max: Vec3::new(b[1][slot], b[3][slot], b[5][slot]),
+            min: Vec3::new(b[0][0][slot], b[1][0][slot], b[2][0][slot]),
+            max: Vec3::new(b[0][1][slot], b[1][1][slot], b[2][1][slot]),
         }
     }
 
     fn set_child(&mut self, slot: usize, node: &Node, child: Child) {
         for axis in 0..3 {
-            self.bounds[2 * axis][slot] = node.min[axis];
-            self.bounds[2 * axis + 1][slot] = node.max[axis];
+            self.bounds[axis][0][slot] = node.min[axis];
+            self.bounds[axis][1][slot] = node.max[axis];
         }
         self.children[slot] = child.pack();
     }

@@ -29,6 +29,18 @@ pub trait Simd: Copy {
     type F8: Lanes<Proof = Self> + Octet;
     /// Sixteen floats.
     type F16: Lanes<Proof = Self>;
+
+    /// Runs `part` as a function of its own, compiled for these instructions: where everything is inlined
+    /// into one, the compiler runs out of registers.
+    fn call<P: Part<Self>>(self, part: P) -> P::Output;
+}
+
+/// A part of a [`Job`], for one instruction set.
+pub trait Part<S: Simd> {
+    /// What comes out.
+    type Output;
+    /// Does it; `#[inline(always)]` as [`Job::run`].
+    fn run(self, simd: S) -> Self::Output;
 }
 
 /// Some floats side by side. Nothing here is NaN, hence nothing is promised about NaN.

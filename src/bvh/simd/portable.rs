@@ -1,7 +1,7 @@
 //! Vectors that every machine has: plain floats, and four at a time through `glam`, which is SSE2 on
 //! x86 and NEON on ARM. Wider ones are pairs of narrower ones. No unsafe code.
 
-use super::{Lanes, Mask, Octet, Simd};
+use super::{Lanes, Mask, Octet, Part, Simd};
 use glam::{BVec4A, Vec4};
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -16,11 +16,21 @@ pub struct Narrow;
 impl Simd for Plain {
     type F8 = Pair<Pair<Pair<One>>>;
     type F16 = Pair<Self::F8>;
+
+    #[inline(never)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        part.run(self)
+    }
 }
 
 impl Simd for Narrow {
     type F8 = Pair<Four>;
     type F16 = Pair<Self::F8>;
+
+    #[inline(never)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        part.run(self)
+    }
 }
 
 /// A single float.
@@ -38,7 +48,7 @@ pub struct Pair<T>(pub(super) T, pub(super) T);
 /// There is nothing to ask for on this machine.
 #[cfg(not(target_arch = "x86_64"))]
 #[inline(always)]
-pub fn prefetch<T>(_: &[T], _: usize) {}
+pub fn prefetch<N, T>(_: &[N], _: &[T], _: crate::bvh::wide::Child) {}
 
 impl One {
     /// The float.

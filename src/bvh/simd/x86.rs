@@ -1,7 +1,8 @@
 //! AVX2 and AVX-512.
 
 use super::portable::{Pair, pair_lanes};
-use super::{Lanes, Mask, Octet, Simd, portable::PairMask};
+use super::{Lanes, Mask, Octet, Part, Simd, portable::PairMask};
+use crate::bvh::wide::Child;
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -59,10 +60,14 @@ impl Avx512 {
     }
 }
 
-/// Asks for the first four cache lines from `of[first]` on, which need not exist, to be brought near.
+/// Asks for four cache lines of what a child is, from its node or its first triangle on, to be brought near.
 #[inline(always)]
-pub fn prefetch<T>(of: &[T], first: usize) {
-    let start: *const i8 = of.as_ptr().wrapping_add(first).cast();
+pub fn prefetch<N, T>(nodes: &[N], triangles: &[T], child: Child) {
+    // Chosen without a branch: which it is cannot be foretold.
+    let start: *const i8 = match child {
+        Child::Node(index) => nodes.as_ptr().wrapping_add(index).cast(),
+        Child::Leaf { first, .. } => triangles.as_ptr().wrapping_add(first).cast(),
+    };
     for line in 0..4 {
         // SAFETY: SSE is part of x86-64, and prefetching touches no memory, wherever it points.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
@@ -72,11 +77,33 @@ pub fn prefetch<T>(of: &[T], first: usize) {
 impl Simd for Avx2 {
     type F8 = Eight;
     type F16 = Pair<Eight>;
+
+    #[inline(always)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        #[inline(never)]
+        #[target_feature(enable = "avx2,popcnt,bmi1,bmi2,lzcnt")]
+        fn with<P: Part<Avx2>>(simd: Avx2, part: P) -> P::Output {
+            part.run(simd)
+        }
+        // SAFETY: an `Avx2` exists only where the instructions do.
+        unsafe { with(self, part) }
+    }
 }
 
 impl Simd for Avx512 {
     type F8 = EightVl;
     type F16 = Sixteen;
+
+    #[inline(always)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        #[inline(never)]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,popcnt,bmi1,bmi2,lzcnt")]
+        fn with<P: Part<Avx512>>(simd: Avx512, part: P) -> P::Output {
+            part.run(simd)
+        }
+        // SAFETY: an `Avx512` exists only where the instructions do.
+        unsafe { with(self, part) }
+    }
 }
 
 /// Eight floats with AVX2.
@@ -203,23 +230,18 @@ macro_rules! lanes {
 }
 
 macro_rules! of_eight {
-    ($name:ident, $op:ident) => {
-        #[target_feature(enable = "avx2")]
-        fn $name(a: __m256) -> f32 {
-            let a = $op(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
-            let a = $op(a, _mm_movehl_ps(a, a));
-            _mm_cvtss_f32($op(a, _mm_shuffle_ps::<1>(a, a)))
-        }
-    };
+    ($op:ident, $a:expr) => {{
+        let a = $op(_mm256_castps256_ps128($a), _mm256_extractf128_ps::<1>($a));
+        let a = $op(a, _mm_movehl_ps(a, a));
+        _mm_cvtss_f32($op(a, _mm_shuffle_ps::<1>(a, a)))
+    }};
 }
-of_eight!(lowest_of_eight, _mm_min_ps);
-of_eight!(highest_of_eight, _mm_max_ps);
 
 lanes!(
     Eight, 8, Avx2, EightMask;
     _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_min_ps _mm256_max_ps
     _mm256_andnot_ps(_mm256_set1_ps(-0.0), a),
-    lowest_of_eight(a), highest_of_eight(a), _mm256_movemask_ps(a) as u32;
+    of_eight!(_mm_min_ps, a), of_eight!(_mm_max_ps, a), _mm256_movemask_ps(a) as u32;
     |a, b|
     EightMask(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)),
     EightMask(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)),
@@ -234,7 +256,7 @@ lanes!(
     EightVl, 8, Avx512, u8;
     _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_min_ps _mm256_max_ps
     _mm256_andnot_ps(_mm256_set1_ps(-0.0), a),
-    lowest_of_eight(a), highest_of_eight(a), _mm256_movemask_ps(a) as u32;
+    of_eight!(_mm_min_ps, a), of_eight!(_mm_max_ps, a), _mm256_movemask_ps(a) as u32;
     |a, b|
     _mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b),
     _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
@@ -313,10 +335,12 @@ static COMPRESS: [u64; 256] = {
 
 /// The eight triples of bits of `order`, lowest first, one to a lane.
 ///
-/// The upper bits of the lanes are not cleared: permutations look at the lowest three only.
-#[target_feature(enable = "avx2")]
-fn order_lanes(order: u32) -> __m256i {
-    _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21))
+/// The upper bits of the lanes are not cleared: permutations look at the lowest three only. A macro, because
+/// a function might be called instead of inlined.
+macro_rules! order_lanes {
+    ($order:expr) => {
+        _mm256_srlv_epi32(_mm256_set1_epi32($order as i32), _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21))
+    };
 }
 
 impl Octet for Eight {
@@ -331,7 +355,7 @@ impl Octet for Eight {
     ) -> usize {
         // SAFETY: the vectors prove AVX2; all pointers are to eight numbers and need no alignment.
         unsafe {
-            let order = order_lanes(order);
+            let order = order_lanes!(order);
             let near_ordered = _mm256_permutevar8x32_ps(near.0, order);
             let entered = _mm256_cmp_ps::<_CMP_LE_OQ>(near.0, far.0);
             let entered = _mm256_permutevar8x32_ps(entered, order);
@@ -358,7 +382,7 @@ impl Octet for EightVl {
     ) -> usize {
         // SAFETY: the vectors prove AVX-512 VL; all pointers are to eight numbers and need no alignment.
         unsafe {
-            let order = order_lanes(order);
+            let order = order_lanes!(order);
             let near = _mm256_permutevar8x32_ps(near.0, order);
             let far = _mm256_permutevar8x32_ps(far.0, order);
             let entered = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, far);
