@@ -114,7 +114,9 @@ fn same_as_brute_force(name: &str, triangles: &[[Vec3; 3]], rays: usize) {
         .collect();
     for isa in Isa::available() {
         let name = format!("{name}, {}", isa.name());
-        for (i, (hit, expected)) in ask(&name, &blas.clone().with_isa(isa), &all).iter().zip(&expected).enumerate() {
+        for (i, (hit, expected)) in
+            ask(&name, &blas.clone().with_isa(isa), &all).iter().zip(&expected).enumerate()
+        {
             assert_eq!(hit, expected, "{name}: ray {i} {:?}", all[i]);
         }
     }

@@ -1,7 +1,7 @@
 //! Many rays: sorted into packets, and what is left walks alone.
 
-use super::leaves::Filter;
 use super::found::Found;
+use super::leaves::Filter;
 use super::packet::Packet;
 use super::rows::{PACKET, Rays, each, lowest};
 use super::simd::{Job, Simd};

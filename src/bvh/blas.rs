@@ -5,8 +5,7 @@ use super::leaves::{All, Filter, Leaves};
 use super::simd::{Isa, Simd};
 use super::wide::{WideBvh, WideNode};
 use super::{Aabb, Bvh, Hit, Probe, Ray};
-use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use glam::Vec3;
 
 /// A hierarchy over triangles, which it keeps in the order of its leaves.
 #[derive(Clone, Debug, Default)]
@@ -21,15 +20,7 @@ impl Blas {
     /// that is not finite have no surface and are never hit.
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
-        let kept: Vec<u32> = (0..triangles.len() as u32)
-            .into_par_iter()
-            .filter(|&i| has_surface(&triangles[i as usize]))
-            .collect();
-        let boxes: Vec<Aabb> = kept.par_iter().map(|&i| Aabb::around(&triangles[i as usize])).collect();
-        let mut bvh = Bvh::build(&boxes);
-        for prim in &mut bvh.prims {
-            *prim = kept[*prim as usize];
-        }
+        let bvh = Bvh::of_triangles(triangles);
         let wide = WideBvh::new(&bvh);
         let leaves = Leaves::new(&wide, triangles);
         Self { wide, leaves, isa: Isa::detect() }
@@ -105,12 +96,7 @@ impl Blas {
     }
 
     /// [`Blas::any_hits`] likewise.
-    pub fn any_hits_by(
-        &self,
-        count: usize,
-        ray: impl Fn(usize) -> Ray,
-        mut report: impl FnMut(usize, bool),
-    ) {
+    pub fn any_hits_by(&self, count: usize, ray: impl Fn(usize) -> Ray, mut report: impl FnMut(usize, bool)) {
         let report = |i: usize, hit: Option<Hit>| report(i, hit.is_some());
         self.isa.run(Batch::<_, _, _, _, true> { target: self, count, ray, filter: All, report });
     }
@@ -161,11 +147,4 @@ impl Target for Blas {
         let mut visitor = Triangles::<F, ANY> { blas: self, instance: 0, found, numbers, filter };
         self.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor)
     }
-}
-
-/// Judged in double precision, where differences and products of f32 are exact or nearly so.
-fn has_surface(corners: &[Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let normal = (b - a).cross(c - a);
-    normal.is_finite() && normal != DVec3::ZERO
 }

@@ -1,8 +1,8 @@
 //! Triangles in the order of the leaves, laid out for vectors.
 
-use super::probe::AXES;
 use super::found::Found;
 use super::packet::Packet;
+use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit};

@@ -7,13 +7,13 @@
 //! for Real-time Whitted Ray Tracing", RT 2008 (ranged traversal); S. Boulos, I. Wald, P. Shirley,
 //! "Geometric and Arithmetic Culling Methods for Entire Ray Packets", 2006 (interval arithmetic).
 
+use super::Aabb;
 use super::probe::{AXES, Probe, SLACK, is_extreme};
 use super::rows::{Class, GROUP, PACKET, Rays, Row, lowest};
 use super::simd::{Lanes, Mask, Octet, Simd, three};
 use super::together::PacketWaiting;
 use super::triangle::Shear;
 use super::wide::{WIDTH, WideNode};
-use super::Aabb;
 use glam::Vec3;
 
 /// Rays of one octant and one largest axis, side by side. Lanes without a ray repeat the last one.
@@ -112,7 +112,11 @@ impl Packet {
             origin: vec(&self.rays.origin),
             direction: vec(&self.rays.direction),
             axis: self.axis,
-            sheared_origin: Vec3::new(self.rays.origin[x].0[lane], self.rays.origin[y].0[lane], self.rays.origin[z].0[lane]),
+            sheared_origin: Vec3::new(
+                self.rays.origin[x].0[lane],
+                self.rays.origin[y].0[lane],
+                self.rays.origin[z].0[lane],
+            ),
             shear: vec(&self.shear),
             inverse: vec(&self.inverse),
             near_origin: vec(&self.near_origin),
@@ -182,8 +186,9 @@ impl Packet {
     #[inline(always)]
     pub fn t_bound<S: Simd>(&self, simd: S, count: usize) -> f32 {
         let groups = count.div_ceil(GROUP);
-        let most = (1..groups)
-            .fold(self.rays.t_max.get::<S::F16>(simd, 0), |most, group| most.max(self.rays.t_max.get(simd, group)));
+        let most = (1..groups).fold(self.rays.t_max.get::<S::F16>(simd, 0), |most, group| {
+            most.max(self.rays.t_max.get(simd, group))
+        });
         most.highest()
     }
 }

@@ -5,9 +5,9 @@ use super::found::Found;
 use super::leaves::{All, Filter, Only};
 use super::packet::Packet;
 use super::rows::{PACKET, Rays, each, lowest};
-use super::together::Visitor;
 use super::simd::{Isa, Simd};
 use super::single::Waiting;
+use super::together::Visitor;
 use super::wide::{WideBvh, WideNode};
 use super::{Aabb, Blas, Bvh, Hit, Probe, Ray};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -293,7 +293,13 @@ impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
                 found.copy(i, self.found, lane);
             }
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter: self.filter };
-            let ended = blas.wide.traverse_packet(simd, local, lowest(members.count_ones() as usize), waiting, &mut visitor);
+            let ended = blas.wide.traverse_packet(
+                simd,
+                local,
+                lowest(members.count_ones() as usize),
+                waiting,
+                &mut visitor,
+            );
             for (i, member) in each(members).enumerate() {
                 let lane = lanes[member % PACKET];
                 self.found.copy(lane, found, i);

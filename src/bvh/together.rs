@@ -18,8 +18,15 @@ pub(super) trait Visitor<S: Simd> {
     fn many(&mut self, simd: S, packet: &mut Packet, first: usize, count: usize, rays: u64) -> u64;
 
     /// The same for the ray of one lane, made ready; answers with the ray's new `t_max`.
-    fn one(&mut self, simd: S, packet: &mut Packet, probe: &Probe, lane: usize, first: usize, count: usize)
-    -> ControlFlow<(), f32>;
+    fn one(
+        &mut self,
+        simd: S,
+        packet: &mut Packet,
+        probe: &Probe,
+        lane: usize,
+        first: usize,
+        count: usize,
+    ) -> ControlFlow<(), f32>;
 }
 
 /// Children that a packet has yet to visit.
@@ -76,7 +83,8 @@ impl WideBvh {
                 if rays == 0 || waiting.nears[count] > t_bound {
                     continue;
                 }
-                let (parent, slot) = (waiting.children[count] as usize / 8, waiting.children[count] as usize % 8);
+                let (parent, slot) =
+                    (waiting.children[count] as usize / 8, waiting.children[count] as usize % 8);
                 let parent = &self.nodes[parent];
                 match Child::unpack(parent.children[slot]) {
                     Child::Node(child) => {

@@ -116,7 +116,8 @@ impl Probe {
         let one = |x: f32| One::splat(Plain, x);
         let [x, y, z] = AXES[self.axis];
         let permuted = |p: Vec3| [one(p[x]), one(p[y]), one(p[z])];
-        let shear = Shear { origin: self.sheared_origin.to_array().map(one), shear: self.shear.to_array().map(one) };
+        let shear =
+            Shear { origin: self.sheared_origin.to_array().map(one), shear: self.shear.to_array().map(one) };
         let mut edges = shear.edges(corners.map(permuted));
         if !edges.inside(Plain) {
             return None;

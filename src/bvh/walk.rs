@@ -160,13 +160,14 @@ impl<'a, S: Simd> Walker<'a, S> {
             (Child::Leaf { first, count }, Some((blas, instance))) => {
                 let (best, number) = (&mut self.best, self.number);
                 let leaf = (first, count);
-                let end = blas.leaves.test_one::<S, ANY>(simd, &self.probe, leaf, instance, self.t_max, |hit| {
-                    let better = best.is_none_or(|known| hit.beats(&known)) && filter.takes(number, &hit);
-                    if better {
-                        *best = Some(hit);
-                    }
-                    better
-                });
+                let end =
+                    blas.leaves.test_one::<S, ANY>(simd, &self.probe, leaf, instance, self.t_max, |hit| {
+                        let better = best.is_none_or(|known| hit.beats(&known)) && filter.takes(number, &hit);
+                        if better {
+                            *best = Some(hit);
+                        }
+                        better
+                    });
                 match end {
                     ControlFlow::Continue(t_max) => self.t_max = t_max,
                     ControlFlow::Break(()) => return false,

@@ -91,7 +91,7 @@ const NODE_COST: f32 = 1.0;
 
 /// Cost of testing the entries of a leaf.
 fn leaf_cost(count: u32) -> f32 {
-    0.6 + 0.2 * count as f32
+    0.9 + 0.1 * count as f32
 }
 
 /// What is known of a binary node's subtree when merging.
@@ -111,7 +111,8 @@ impl WideBvh {
     pub fn new(bvh: &Bvh) -> Self {
         let Some(root) = bvh.nodes.first() else { return Self::default() };
         let plans = plan(bvh);
-        let mut merge = Merge { bvh, plans: &plans, nodes: Vec::new(), prims: Vec::with_capacity(bvh.prims.len()) };
+        let mut merge =
+            Merge { bvh, plans: &plans, nodes: Vec::new(), prims: Vec::with_capacity(bvh.prims.len()) };
         merge.nodes.push(WideNode::EMPTY);
         if plans[0].left[0] == 0 {
             let leaf = merge.leaf(0);

@@ -1,7 +1,7 @@
 //! Which instructions to use, decided once.
 
-use super::portable::{Narrow, Plain};
 use super::Simd;
+use super::portable::{Narrow, Plain};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
 

@@ -1,0 +1,409 @@
+//! Top down by the surface area heuristic in bins.
+//!
+//! Reference: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007. Each level is
+//! two passes over the list: one sorts it into bins, the other parts it in two and finds the extents of
+//! both halves on the way.
+
+use super::{Bvh, Node, SAH_LEVELS};
+use crate::bvh::Aabb;
+use glam::{Vec3, Vec4, Vec4Swizzles};
+use rayon::prelude::*;
+
+/// A box to be sorted: the lower corner and the index in one vector, the upper corner in the other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prim {
+    lo: Vec4,
+    hi: Vec4,
+}
+
+/// Makes an index below 2²⁸ an ordinary float, so that vectors it is part of are not slowed down by a
+/// denormal one.
+const INDEX_MARK: u32 = 0x4000_0000;
+
+/// A box and the box of the centres of what is in it. The fourth components mean nothing.
+#[derive(Clone, Copy)]
+struct Extent {
+    lo: Vec4,
+    hi: Vec4,
+    center_lo: Vec4,
+    center_hi: Vec4,
+}
+
+#[derive(Clone, Copy)]
+struct Bin {
+    lo: Vec4,
+    hi: Vec4,
+}
+
+/// Cost of visiting a node over that of testing a triangle.
+const NODE_COST: f32 = 1.0;
+/// Lists of at least this length are shared out among threads in pieces of this length.
+const PIECE: usize = 1 << 14;
+/// Subtrees over fewer are one task.
+const TASK: usize = 1 << 13;
+
+impl Prim {
+    pub fn new(aabb: Aabb, index: u32) -> Self {
+        debug_assert!(index < INDEX_MARK >> 2);
+        Self { lo: aabb.min.extend(f32::from_bits(INDEX_MARK | index)), hi: aabb.max.extend(0.0) }
+    }
+
+    pub fn index(&self) -> u32 {
+        self.lo.w.to_bits() & !INDEX_MARK
+    }
+
+    fn center(&self) -> Vec4 {
+        self.lo * 0.5 + self.hi * 0.5
+    }
+}
+
+impl Extent {
+    const EMPTY: Self = Self {
+        lo: Vec4::INFINITY,
+        hi: Vec4::NEG_INFINITY,
+        center_lo: Vec4::INFINITY,
+        center_hi: Vec4::NEG_INFINITY,
+    };
+
+    fn add(&mut self, prim: &Prim) {
+        let center = prim.center();
+        self.lo = self.lo.min(prim.lo);
+        self.hi = self.hi.max(prim.hi);
+        self.center_lo = self.center_lo.min(center);
+        self.center_hi = self.center_hi.max(center);
+    }
+
+    fn union(self, other: Self) -> Self {
+        Self {
+            lo: self.lo.min(other.lo),
+            hi: self.hi.max(other.hi),
+            center_lo: self.center_lo.min(other.center_lo),
+            center_hi: self.center_hi.max(other.center_hi),
+        }
+    }
+
+    fn of(prims: &[Prim]) -> Self {
+        prims.iter().fold(Self::EMPTY, |mut extent, prim| {
+            extent.add(prim);
+            extent
+        })
+    }
+}
+
+fn half_area(lo: Vec4, hi: Vec4) -> f32 {
+    let d: Vec3 = (hi - lo).xyz().max(Vec3::ZERO);
+    d.x * d.y + d.y * d.z + d.z * d.x
+}
+
+/// What a subtree became, while threads are at it.
+enum Subtree {
+    /// Nodes numbered from the root of this subtree.
+    Done(Vec<Node>),
+    Inner(Node, Box<[Subtree; 2]>),
+}
+
+/// Builds over `prims`, at most `max_leaf` to a leaf unless they cannot be told apart.
+pub(super) fn build(mut prims: Vec<Prim>, max_leaf: usize) -> Bvh {
+    if prims.is_empty() {
+        return Bvh::default();
+    }
+    let extent = prims.par_chunks(PIECE).map(Extent::of).reduce(|| Extent::EMPTY, Extent::union);
+    let mut spare = prims.clone();
+    let mut order = vec![0; prims.len()];
+    let tree = large(&mut prims, &mut spare, &mut order, 0, extent, max_leaf, 0);
+    let mut nodes = vec![Node { min: Vec3::ZERO, first: 0, max: Vec3::ZERO, count: 0 }];
+    assemble(tree, 0, &mut nodes);
+    Bvh { nodes, prims: order }
+}
+
+/// Puts `tree` into the array, its root at `slot`.
+fn assemble(tree: Subtree, slot: usize, nodes: &mut Vec<Node>) {
+    match tree {
+        Subtree::Done(own) => {
+            // The root goes to its slot, the others to the end.
+            let moved = |node: &Node| {
+                let shift = if node.count == 0 { nodes.len() as u32 - 1 } else { 0 };
+                Node { first: node.first + shift, ..*node }
+            };
+            let root = moved(&own[0]);
+            let rest: Vec<Node> = own[1..].iter().map(moved).collect();
+            nodes[slot] = root;
+            nodes.extend(rest);
+        }
+        Subtree::Inner(node, children) => {
+            let pair = nodes.len();
+            nodes[slot] = Node { first: pair as u32, ..node };
+            nodes.extend([node, node]);
+            let [left, right] = *children;
+            assemble(left, pair, nodes);
+            assemble(right, pair + 1, nodes);
+        }
+    }
+}
+
+/// The subtree over `prims`, whose entries start at `first`; with threads while it is large.
+fn large(
+    prims: &mut [Prim],
+    spare: &mut [Prim],
+    order: &mut [u32],
+    first: usize,
+    extent: Extent,
+    max_leaf: usize,
+    depth: usize,
+) -> Subtree {
+    if prims.len() < TASK {
+        let mut nodes = vec![leaf(&extent, 0, 0)];
+        small(prims, spare, order, first, &extent, max_leaf, depth, 0, &mut nodes);
+        return Subtree::Done(nodes);
+    }
+    let (middle, extents) = part(prims, spare, &extent, depth);
+    let (left, right) = spare.split_at_mut(middle);
+    let (left_spare, right_spare) = prims.split_at_mut(middle);
+    let (left_order, right_order) = order.split_at_mut(middle);
+    let [left_extent, right_extent] = extents;
+    let (left, right) = rayon::join(
+        || large(left, left_spare, left_order, first, left_extent, max_leaf, depth + 1),
+        || large(right, right_spare, right_order, first + middle, right_extent, max_leaf, depth + 1),
+    );
+    Subtree::Inner(leaf(&extent, 0, 0), Box::new([left, right]))
+}
+
+fn leaf(extent: &Extent, first: usize, count: usize) -> Node {
+    Node { min: extent.lo.xyz(), first: first as u32, max: extent.hi.xyz(), count: count as u32 }
+}
+
+/// The same by one thread, the root being node `slot`.
+#[expect(clippy::too_many_arguments, reason = "the state of a recursion that must not allocate")]
+fn small(
+    prims: &mut [Prim],
+    spare: &mut [Prim],
+    order: &mut [u32],
+    first: usize,
+    extent: &Extent,
+    max_leaf: usize,
+    depth: usize,
+    slot: usize,
+    nodes: &mut Vec<Node>,
+) {
+    if prims.len() <= max_leaf && !pays(prims, extent, max_leaf) {
+        nodes[slot] = leaf(extent, first, prims.len());
+        for (index, prim) in order.iter_mut().zip(prims) {
+            *index = prim.index();
+        }
+        return;
+    }
+    let (middle, [left, right]) = part(prims, spare, extent, depth);
+    let pair = nodes.len();
+    nodes[slot] = leaf(extent, pair, 0);
+    nodes.extend([leaf(&left, 0, 0), leaf(&right, 0, 0)]);
+    let (left_prims, right_prims) = spare.split_at_mut(middle);
+    let (left_spare, right_spare) = prims.split_at_mut(middle);
+    let (left_order, right_order) = order.split_at_mut(middle);
+    small(left_prims, left_spare, left_order, first, &left, max_leaf, depth + 1, pair, nodes);
+    let first = first + middle;
+    small(right_prims, right_spare, right_order, first, &right, max_leaf, depth + 1, pair + 1, nodes);
+}
+
+/// Whether splitting what would fit into a leaf is worth a node.
+fn pays(prims: &[Prim], extent: &Extent, max_leaf: usize) -> bool {
+    if prims.len() < 2 || max_leaf < 2 {
+        return false;
+    }
+    let Some((cost, _)) = best_plane(&Bins::<4>::with(prims, Grid::new(extent, 4))) else { return false };
+    let area = half_area(extent.lo, extent.hi);
+    NODE_COST * area + cost < area * prims.len() as f32
+}
+
+/// Moves `prims` to `spare`, parted in two, neither side empty; returns where, and the extents of both.
+///
+/// The fewer there are the fewer bins: they cost more than what goes into them.
+fn part(prims: &[Prim], spare: &mut [Prim], extent: &Extent, depth: usize) -> (usize, [Extent; 2]) {
+    let parted = match prims.len() {
+        _ if depth >= SAH_LEVELS => None,
+        0..12 => part_binned::<4>(prims, spare, extent),
+        12..64 => part_binned::<8>(prims, spare, extent),
+        _ => part_binned::<16>(prims, spare, extent),
+    };
+    parted.unwrap_or_else(|| {
+        spare.copy_from_slice(prims);
+        let middle = prims.len() / 2;
+        (middle, [Extent::of(&prims[..middle]), Extent::of(&prims[middle..])])
+    })
+}
+
+/// At the cheapest plane between `N` bins, if there is one.
+fn part_binned<const N: usize>(
+    prims: &[Prim],
+    spare: &mut [Prim],
+    extent: &Extent,
+) -> Option<(usize, [Extent; 2])> {
+    let grid = Grid::new(extent, N);
+    let pieces = prims.len() >= 2 * PIECE;
+    let bins: Bins<N> = if pieces {
+        let binned = prims.par_chunks(PIECE).map(|piece| Bins::with(piece, grid));
+        binned.reduce(|| Bins::empty(grid), Bins::union)
+    } else {
+        Bins::with(prims, grid)
+    };
+    let (_, plane) = best_plane(&bins)?;
+    let is_left = |prim: &Prim| grid.bin::<N>(prim)[plane.axis] < plane.bin;
+    Some(if pieces { part_pieces(prims, spare, is_left) } else { part_piece(prims, spare, is_left) })
+}
+
+/// Those on the left from the front, those on the right from the back.
+fn part_piece(prims: &[Prim], to: &mut [Prim], is_left: impl Fn(&Prim) -> bool) -> (usize, [Extent; 2]) {
+    let mut extents = [Extent::EMPTY; 2];
+    let (mut left, mut right) = (0, to.len());
+    for prim in prims {
+        // No branch, which could not be foretold: written to both ends, the other is overwritten later.
+        let side = usize::from(!is_left(prim));
+        to[left] = *prim;
+        to[right - 1] = *prim;
+        left += 1 - side;
+        right -= side;
+        extents[side].add(prim);
+    }
+    (left, extents)
+}
+
+/// The same in pieces by all threads.
+fn part_pieces(
+    prims: &[Prim],
+    to: &mut [Prim],
+    is_left: impl Fn(&Prim) -> bool + Sync,
+) -> (usize, [Extent; 2]) {
+    let counts: Vec<usize> =
+        prims.par_chunks(PIECE).map(|piece| piece.iter().filter(|prim| is_left(prim)).count()).collect();
+    let middle = counts.iter().sum();
+    let (mut left, mut right) = to.split_at_mut(middle);
+    let mut places = Vec::with_capacity(counts.len());
+    for (piece, &count) in prims.chunks(PIECE).zip(&counts) {
+        let (own_left, rest) = left.split_at_mut(count);
+        left = rest;
+        let (own_right, rest) = right.split_at_mut(piece.len() - count);
+        right = rest;
+        places.push((piece, own_left, own_right));
+    }
+    let extents = places
+        .into_par_iter()
+        .map(|(piece, left, right)| {
+            let mut extents = [Extent::EMPTY; 2];
+            let (mut to_left, mut to_right) = (left.iter_mut(), right.iter_mut());
+            for prim in piece {
+                let side = usize::from(!is_left(prim));
+                let next = if side == 0 { to_left.next() } else { to_right.next() };
+                if let Some(place) = next {
+                    *place = *prim;
+                }
+                extents[side].add(prim);
+            }
+            extents
+        })
+        .reduce(|| [Extent::EMPTY; 2], |a, b| [a[0].union(b[0]), a[1].union(b[1])]);
+    (middle, extents)
+}
+
+/// Where the bins are.
+#[derive(Clone, Copy)]
+struct Grid {
+    origin: Vec4,
+    /// Bins per length; 0 along axes without extent.
+    scale: Vec4,
+}
+
+impl Grid {
+    fn new(extent: &Extent, bins: usize) -> Self {
+        let size = extent.center_hi - extent.center_lo;
+        let scale = size.map(|size| if size > 0.0 { bins as f32 / size } else { 0.0 });
+        let finite = scale.map(|scale| if scale.is_finite() { scale } else { 0.0 });
+        Self { origin: extent.center_lo, scale: finite }
+    }
+
+    /// For each axis the bin of a prim's centre.
+    #[inline]
+    fn bin<const N: usize>(&self, prim: &Prim) -> [usize; 3] {
+        // Rounds down by adding so much that only whole numbers remain, which is cheaper than a cast that
+        // saturates. Monotonic, which is all that matters.
+        let place = (prim.center() - self.origin) * self.scale - 0.5;
+        let place = place.min(Vec4::splat((N - 1) as f32)).max(Vec4::ZERO) + (1 << 23) as f32;
+        [place.x, place.y, place.z].map(|place| place.to_bits() as usize % N)
+    }
+}
+
+#[derive(Clone)]
+struct Bins<const N: usize> {
+    grid: Grid,
+    bins: [[Bin; N]; 3],
+    counts: [[u32; N]; 3],
+}
+
+impl<const N: usize> Bins<N> {
+    fn empty(grid: Grid) -> Self {
+        let none = Bin { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
+        Self { grid, bins: [[none; N]; 3], counts: [[0; N]; 3] }
+    }
+
+    fn with(prims: &[Prim], grid: Grid) -> Self {
+        let mut bins = Self::empty(grid);
+        for prim in prims {
+            let places = grid.bin::<N>(prim);
+            for axis in 0..3 {
+                let bin = &mut bins.bins[axis][places[axis] % N];
+                bin.lo = bin.lo.min(prim.lo);
+                bin.hi = bin.hi.max(prim.hi);
+                bins.counts[axis][places[axis] % N] += 1;
+            }
+        }
+        bins
+    }
+
+    fn union(mut self, other: Self) -> Self {
+        for axis in 0..3 {
+            for i in 0..N {
+                let bin = &mut self.bins[axis][i];
+                bin.lo = bin.lo.min(other.bins[axis][i].lo);
+                bin.hi = bin.hi.max(other.bins[axis][i].hi);
+                self.counts[axis][i] += other.counts[axis][i];
+            }
+        }
+        self
+    }
+}
+
+/// Bins of `axis` below `bin` are left of it.
+struct Plane {
+    axis: usize,
+    bin: usize,
+}
+
+/// The cheapest plane with something on both sides, and its cost: areas times numbers.
+fn best_plane<const N: usize>(bins: &Bins<N>) -> Option<(f32, Plane)> {
+    let mut best: Option<(f32, Plane)> = None;
+    for axis in 0..3 {
+        if bins.grid.scale[axis] == 0.0 {
+            continue;
+        }
+        let (boxes, counts) = (&bins.bins[axis], &bins.counts[axis]);
+        // Cost of everything right of each plane, then sweep from the left.
+        let mut right = [0.0; N];
+        let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        for i in (1..N).rev() {
+            lo = lo.min(boxes[i].lo);
+            hi = hi.max(boxes[i].hi);
+            count += counts[i];
+            right[i] = half_area(lo, hi) * count as f32;
+        }
+        let all = count + counts[0];
+        let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        for i in 1..N {
+            lo = lo.min(boxes[i - 1].lo);
+            hi = hi.max(boxes[i - 1].hi);
+            count += counts[i - 1];
+            let cost = half_area(lo, hi) * count as f32 + right[i];
+            if count > 0 && count < all && best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, Plane { axis, bin: i }));
+            }
+        }
+    }
+    best
+}
