@@ -55,6 +55,7 @@ impl Packet {
 
     /// Makes `self.rays`, `count` of the given class, ready for boxes and triangles inside `bounds`, as
     /// [`Probe::with_slack`] does, to the bit.
+    #[expect(clippy::needless_range_loop, reason = "an axis of seven arrays")]
     #[inline(always)]
     pub fn prepare<S: Simd>(&mut self, simd: S, class: Class, count: usize, bounds: &Aabb, slack: f32) {
         let groups = count.div_ceil(GROUP);

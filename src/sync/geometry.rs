@@ -64,6 +64,7 @@ pub fn choose_origin(
 }
 
 /// Builds the TLAS anew when an instance came, went, moved or changed its mesh or materials.
+#[expect(clippy::too_many_arguments, reason = "everything that the top level is made of")]
 pub fn sync_geometry(
     mut geometry: ResMut<Geometry>,
     mut redone: ResMut<Redone>,

@@ -346,12 +346,11 @@ impl<const N: usize> Bins<N> {
     fn with(prims: &[Prim], grid: Grid) -> Self {
         let mut bins = Self::empty(grid);
         for prim in prims {
-            let places = grid.bin::<N>(prim);
-            for axis in 0..3 {
-                let bin = &mut bins.bins[axis][places[axis] % N];
+            for (axis, place) in grid.bin::<N>(prim).into_iter().enumerate() {
+                let bin = &mut bins.bins[axis][place % N];
                 bin.lo = bin.lo.min(prim.lo);
                 bin.hi = bin.hi.max(prim.hi);
-                bins.counts[axis][places[axis] % N] += 1;
+                bins.counts[axis][place % N] += 1;
             }
         }
         bins
