@@ -122,6 +122,27 @@ fn same_as_brute_force(name: &str, triangles: &[[Vec3; 3]], rays: usize) {
     }
 }
 
+/// From so far away that triangles are tested in double precision, together with nearer ones that are not.
+#[test]
+fn a_ray_does_not_depend_on_how_far_away_its_neighbours_start() {
+    let triangles: Vec<_> = soup(300, 0.3, 4).into_iter().map(|t| t.map(|p| p * 1e11)).collect();
+    let mut rng = Rng(3);
+    let rays: Vec<Ray> = (0..2048)
+        .map(|i| {
+            let target = triangles[rng.below(triangles.len())].iter().sum::<Vec3>() / 3.0;
+            let from = Vec3::new(3.0, 2.0, 5.0).normalize() * if i % 2 == 0 { 2e11 } else { 4e12 };
+            Ray::new(target + from, -from)
+        })
+        .collect();
+    let blas = Blas::build(&triangles);
+    let expected: Vec<_> = rays.iter().map(|ray| brute_force(&triangles, ray)).collect();
+    assert!(expected.iter().flatten().count() > 1000);
+    for isa in Isa::available() {
+        let name = format!("near and far, {}", isa.name());
+        assert_eq!(ask(&name, &blas.clone().with_isa(isa), &rays), expected, "{name}");
+    }
+}
+
 fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
     let mut rng = Rng(seed);
     (0..count)

@@ -3,7 +3,7 @@
 use super::batch::{Batch, Scratch, Target, Triangles};
 use super::leaves::{All, Filter, Leaves};
 use super::simd::{Isa, Simd};
-use super::wide::{WideBvh, WideNode};
+use super::wide::{MAX_LEAF, WideBvh, WideNode};
 use super::{Aabb, Bvh, Hit, Probe, Ray};
 use glam::Vec3;
 
@@ -21,7 +21,7 @@ impl Blas {
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
         let bvh = Bvh::of_triangles(triangles);
-        let wide = WideBvh::new(&bvh);
+        let wide = WideBvh::new(&bvh, MAX_LEAF);
         let leaves = Leaves::new(&wide, triangles);
         Self { wide, leaves, isa: Isa::detect() }
     }

@@ -184,22 +184,20 @@ impl Leaves {
                 rest &= !(0xffff << base);
                 let shear = packet.shear::<S>(simd, group);
                 let edges: Edges<S::F16> = shear.edges(permuted);
-                let inside = edges.inside(simd).bits() & members;
-                if inside == 0 && !packet.extreme {
+                let extreme = (packet.extreme >> base) as u32 & members;
+                let inside = edges.inside(simd).bits() & members & !extreme;
+                if inside | extreme == 0 {
                     continue;
                 }
                 let distance = shear.distance(simd, &edges);
-                let mut on_edge = distance.on_edge.bits() & inside;
-                let mut certain = distance.ahead.bits() & inside & !on_edge;
-                let mut near = distance.near.bits() & inside & !on_edge;
-                if packet.extreme {
-                    (on_edge, certain, near) = (members, 0, 0);
-                }
+                let on_edge = distance.on_edge.bits() & inside;
+                let certain = distance.ahead.bits() & inside & !on_edge;
+                let near = distance.near.bits() & inside & !on_edge;
                 let t_max: S::F16 = packet.rays.t_max.get(simd, group);
                 let u = edges.weights[1] * distance.inverse_determinant;
                 let v = edges.weights[2] * distance.inverse_determinant;
                 let mut rough_t = distance.t;
-                let mut one_by_one = near | on_edge;
+                let mut one_by_one = near | on_edge | extreme;
                 if certain != 0 {
                     let t = distance.t.max(packet.entry::<S>(simd, group, &corners));
                     let closer = certain & t.lt(t_max).bits();

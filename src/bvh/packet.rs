@@ -8,7 +8,7 @@
 //! "Geometric and Arithmetic Culling Methods for Entire Ray Packets", 2006 (interval arithmetic).
 
 use super::Aabb;
-use super::probe::{AXES, Probe, SLACK, is_extreme};
+use super::probe::{AXES, EXTREME, Probe, SLACK};
 use super::rows::{Class, GROUP, PACKET, Rays, Row, lowest};
 use super::simd::{Lanes, Mask, Octet, Simd, three};
 use super::together::PacketWaiting;
@@ -27,7 +27,8 @@ pub(super) struct Packet {
     pub inverse: [Row; 3],
     pub near_origin: [Row; 3],
     pub far_origin: [Row; 3],
-    pub extreme: bool,
+    /// Bits, as in [`Probe`]: each ray's own affair, or its hit would depend on its neighbours.
+    pub extreme: u64,
     /// Of all near origins the one that meets boxes first; of all far origins the one that leaves them last.
     first: [f32; 3],
     last: [f32; 3],
@@ -46,7 +47,7 @@ impl Packet {
             inverse: row,
             near_origin: row,
             far_origin: row,
-            extreme: false,
+            extreme: 0,
             first: [0.0; 3],
             last: [0.0; 3],
             inverse_span: [[0.0; 2]; 3],
@@ -65,7 +66,7 @@ impl Packet {
         let one = constant(1.0);
         let finite = |lanes: S::F16| lanes.min(constant(f32::MAX)).max(constant(-f32::MAX));
         let mut spans = [[[constant(f32::INFINITY), constant(f32::NEG_INFINITY)]; 3]; 3];
-        let mut reaches = [constant(f32::INFINITY), constant(0.0)];
+        self.extreme = 0;
         for group in 0..groups {
             let row = |rows: &[Row; 3], axis: usize| rows[axis].get::<S::F16>(simd, group);
             let origin: [S::F16; 3] = three(|axis| row(&self.rays.origin, axis));
@@ -91,7 +92,8 @@ impl Packet {
             self.shear[1].set(group, direction[y] / direction[z]);
             self.shear[2].set(group, one / direction[z]);
             let farthest = reach[0].max(reach[1]).max(reach[2]);
-            reaches = [reaches[0].min(farthest), reaches[1].max(farthest)];
+            let ordinary = constant(1.0 / EXTREME).le(farthest).and(farthest.lt(constant(EXTREME)));
+            self.extreme |= u64::from(!ordinary.bits() & 0xffff) << (group * GROUP);
         }
         for axis in 0..3 {
             let [near, far, inverse] = spans[axis];
@@ -100,7 +102,6 @@ impl Packet {
             self.last[axis] = if forward { far[0].lowest() } else { far[1].highest() };
             self.inverse_span[axis] = [inverse[0].lowest(), inverse[1].highest()];
         }
-        self.extreme = is_extreme(reaches[0].lowest()) || is_extreme(reaches[1].highest());
     }
 
     /// One of the rays, alone and ready.
@@ -122,7 +123,7 @@ impl Packet {
             inverse: vec(&self.inverse),
             near_origin: vec(&self.near_origin),
             far_origin: vec(&self.far_origin),
-            extreme: self.extreme,
+            extreme: self.extreme >> lane & 1 != 0,
         }
     }
 

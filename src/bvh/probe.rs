@@ -45,11 +45,7 @@ pub(super) fn largest_axis(v: Vec3) -> usize {
 pub(super) const SLACK: f32 = 12.0 / (1 << 24) as f32;
 /// Beyond this distance, or if all is nearer than its reciprocal, products in single precision might
 /// overflow or vanish.
-const EXTREME: f32 = (1u64 << 40) as f32;
-
-pub(super) fn is_extreme(reach: f32) -> bool {
-    !(1.0 / EXTREME..EXTREME).contains(&reach)
-}
+pub(super) const EXTREME: f32 = (1u64 << 40) as f32;
 
 impl Probe {
     /// Prepares `ray` for boxes and triangles inside `bounds`.
@@ -88,7 +84,7 @@ impl Probe {
             inverse: inverse.into(),
             near_origin: finite(origin + outward * slack).into(),
             far_origin: finite(origin - outward * slack).into(),
-            extreme: is_extreme(reach.max_element()),
+            extreme: !(1.0 / EXTREME..EXTREME).contains(&reach.max_element()),
         }
     }
 

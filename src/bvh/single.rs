@@ -26,13 +26,6 @@ impl Default for Waiting {
 }
 
 impl Waiting {
-    /// Lets a child wait.
-    #[inline(always)]
-    pub fn set(&mut self, i: usize, near: f32, child: Child) {
-        self.nears[i] = near;
-        self.children[i] = child.pack();
-    }
-
     /// Where the ray enters a waiting child, and what it is.
     #[inline(always)]
     pub fn get(&self, i: usize) -> (f32, u32) {

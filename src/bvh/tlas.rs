@@ -109,7 +109,7 @@ impl Tlas {
             .map(|b| if b.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { b })
             .collect();
         let slack = placements.iter().map(Placement::condition).fold(1.0, f32::max);
-        Self { wide: WideBvh::new(&Bvh::build(&boxes)), isa: Isa::detect(), placements, slack }
+        Self { wide: WideBvh::new(&Bvh::build(&boxes), 1), isa: Isa::detect(), placements, slack }
     }
 
     /// What it was built over.
@@ -315,13 +315,9 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
     #[inline(always)]
     fn many(&mut self, simd: S, packet: &mut Packet, first: usize, count: usize, rays: u64) -> u64 {
         let tlas = self.tlas;
-        let mut done = 0;
-        for &instance in &tlas.wide.prims[first..first + count] {
-            if rays & !done != 0 {
-                done |= self.instance(simd, packet, instance, rays & !done);
-            }
-        }
-        done
+        // One instance to a leaf: each is asked for by its own box.
+        debug_assert_eq!(count, 1);
+        self.instance(simd, packet, tlas.wide.prims[first], rays)
     }
 
     #[inline(always)]
@@ -335,17 +331,17 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
         count: usize,
     ) -> ControlFlow<(), f32> {
         let tlas = self.tlas;
-        for &instance in &tlas.wide.prims[first..first + count] {
-            let placement = &tlas.placements[instance as usize];
-            let blas = &*placement.blas;
-            let local = (!placement.identity)
-                .then(|| Probe::new(&placement.local(&packet.rays.get(lane)), &blas.bounds()));
-            let probe = local.as_ref().unwrap_or(probe);
-            let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
-            let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
-            let waiting: &mut Waiting = &mut self.inner.waiting.single;
-            blas.wide.traverse_one(simd, packet, probe, lane, 0, waiting, &mut visitor)?;
-        }
+        debug_assert_eq!(count, 1);
+        let instance = tlas.wide.prims[first];
+        let placement = &tlas.placements[instance as usize];
+        let blas = &*placement.blas;
+        let local = (!placement.identity)
+            .then(|| Probe::new(&placement.local(&packet.rays.get(lane)), &blas.bounds()));
+        let probe = local.as_ref().unwrap_or(probe);
+        let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
+        let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
+        let waiting: &mut Waiting = &mut self.inner.waiting.single;
+        blas.wide.traverse_one(simd, packet, probe, lane, 0, waiting, &mut visitor)?;
         ControlFlow::Continue(packet.rays.t_max.0[lane % PACKET])
     }
 }

@@ -137,7 +137,7 @@ impl<'a, S: Simd> Walker<'a, S> {
             self.count -= 1;
             let (near, child) = self.waiting.get(self.count);
             if near <= self.t_max {
-                return self.visit::<T, F, ANY>(simd, target, filter, near, Child::unpack(child));
+                return self.visit::<T, F, ANY>(simd, target, filter, Child::unpack(child));
             }
         }
     }
@@ -148,7 +148,6 @@ impl<'a, S: Simd> Walker<'a, S> {
         simd: S,
         target: &'a T,
         filter: F,
-        near: f32,
         child: Child,
     ) -> bool {
         let inside = if T::ONE_LEVEL { target.only() } else { self.inside };
@@ -173,11 +172,7 @@ impl<'a, S: Simd> Walker<'a, S> {
                     ControlFlow::Break(()) => return false,
                 }
             }
-            (Child::Leaf { first, count }, None) => {
-                if count > 1 {
-                    self.waiting.set(self.count, near, Child::Leaf { first: first + 1, count: count - 1 });
-                    self.count += 1;
-                }
+            (Child::Leaf { first, .. }, None) => {
                 let (blas, instance, local) = target.enter(first, &self.ray);
                 self.probe = local.unwrap_or(self.world);
                 (self.inside, self.outside) = (Some((blas, instance)), self.count);

@@ -61,7 +61,7 @@ impl Child {
         Self::Leaf { first: first as usize, count: count as usize }
     }
 
-    pub(super) fn pack(self) -> u32 {
+    fn pack(self) -> u32 {
         match self {
             Self::Node(index) => index as u32,
             Self::Leaf { first, count } => LEAF | (count as u32 - 1) << FIRST_BITS | first as u32,
@@ -106,11 +106,11 @@ struct Plan {
 }
 
 impl WideBvh {
-    /// Merges the nodes of `bvh`.
+    /// Merges the nodes of `bvh`, and leaves to such of at most `max_leaf` ≤ 8 entries where that is cheaper.
     #[must_use]
-    pub fn new(bvh: &Bvh) -> Self {
+    pub fn new(bvh: &Bvh, max_leaf: usize) -> Self {
         let Some(root) = bvh.nodes.first() else { return Self::default() };
-        let plans = plan(bvh);
+        let plans = plan(bvh, max_leaf);
         let mut merge =
             Merge { bvh, plans: &plans, nodes: Vec::new(), prims: Vec::with_capacity(bvh.prims.len()) };
         merge.nodes.push(WideNode::EMPTY);
@@ -133,7 +133,7 @@ impl WideBvh {
     }
 }
 
-fn plan(bvh: &Bvh) -> Vec<Plan> {
+fn plan(bvh: &Bvh, max_leaf: usize) -> Vec<Plan> {
     let empty = Plan { cost: [0.0; WIDTH - 1], left: [0; WIDTH - 1], count: 0 };
     let mut plans = vec![empty; bvh.nodes.len()];
     // Children come after their parents.
@@ -150,7 +150,7 @@ fn plan(bvh: &Bvh) -> Vec<Plan> {
             let (cost, split) = best_split(left, right, WIDTH);
             plan.cost[0] = area * NODE_COST + cost;
             plan.left[0] = split;
-            if count as usize <= MAX_LEAF && area * leaf_cost(count) <= plan.cost[0] {
+            if count as usize <= max_leaf && area * leaf_cost(count) <= plan.cost[0] {
                 plan.cost[0] = area * leaf_cost(count);
                 plan.left[0] = 0;
             }

@@ -1,9 +1,9 @@
 //! Which instructions to use, decided once.
 
-use super::Simd;
 use super::portable::{Narrow, Plain};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
+use super::{Part, Simd};
 
 /// A set of instructions that this machine is known to have.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,15 @@ pub trait Job {
     type Output;
     /// Does it.
     fn run<S: Simd>(self, simd: S) -> Self::Output;
+}
+
+impl<S: Simd, J: Job> Part<S> for J {
+    type Output = J::Output;
+
+    #[inline(always)]
+    fn run(self, simd: S) -> J::Output {
+        Job::run(self, simd)
+    }
 }
 
 impl Default for Isa {
@@ -90,12 +99,12 @@ impl Isa {
     #[inline]
     pub fn run<J: Job>(self, job: J) -> J::Output {
         match self.0 {
-            Kind::Plain => job.run(Plain),
-            Kind::Narrow => job.run(Narrow),
+            Kind::Plain => Plain.call(job),
+            Kind::Narrow => Narrow.call(job),
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2(proof) => proof.run(job),
+            Kind::Avx2(proof) => proof.call(job),
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx512(proof) => proof.run(job),
+            Kind::Avx512(proof) => proof.call(job),
         }
     }
 }

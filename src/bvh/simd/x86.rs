@@ -24,17 +24,6 @@ impl Avx2 {
             && is_x86_feature_detected!("lzcnt");
         has.then_some(Self(()))
     }
-
-    /// Runs `job` compiled for them.
-    #[inline]
-    pub fn run<J: super::Job>(self, job: J) -> J::Output {
-        #[target_feature(enable = "avx2,popcnt,bmi1,bmi2,lzcnt")]
-        fn with<J: super::Job>(simd: Avx2, job: J) -> J::Output {
-            job.run(simd)
-        }
-        // SAFETY: an `Avx2` exists only where the instructions do.
-        unsafe { with(self, job) }
-    }
 }
 
 impl Avx512 {
@@ -46,17 +35,6 @@ impl Avx512 {
             && is_x86_feature_detected!("avx512dq")
             && is_x86_feature_detected!("avx512bw");
         has.then_some(Self(()))
-    }
-
-    /// Runs `job` compiled for them.
-    #[inline]
-    pub fn run<J: super::Job>(self, job: J) -> J::Output {
-        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,popcnt,bmi1,bmi2,lzcnt")]
-        fn with<J: super::Job>(simd: Avx512, job: J) -> J::Output {
-            job.run(simd)
-        }
-        // SAFETY: an `Avx512` exists only where the instructions do.
-        unsafe { with(self, job) }
     }
 }
 
