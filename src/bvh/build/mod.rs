@@ -40,6 +40,16 @@ pub const MAX_DEPTH: usize = SAH_LEVELS + 32;
 /// Beyond this many triangles a leaf is always split.
 const MAX_LEAF: usize = 4;
 
+/// How much work goes into a hierarchy. What is hit is the same, bit for bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Quality {
+    /// Soon ready: for what was just opened or changed.
+    #[default]
+    Interactive,
+    /// Fast to trace: for a view that somebody looks at for some seconds.
+    Rested,
+}
+
 impl Bvh {
     /// Builds over `boxes`, all finite and not empty, each in a leaf of its own. There may be none, or many
     /// equal ones.
