@@ -1,10 +1,11 @@
 //! Bottom level: the triangles of one mesh.
 
 use super::batch::{Batch, Scratch, Target, Triangles};
+use super::build::build_triangles;
 use super::leaves::{All, Filter, Leaves};
 use super::simd::{Isa, Simd};
-use super::wide::{MAX_LEAF, WideBvh, WideNode};
-use super::{Aabb, Bvh, Hit, Probe, Quality, Ray};
+use super::wide::{WideBvh, WideNode};
+use super::{Aabb, Hit, Probe, Quality, Ray};
 use glam::Vec3;
 
 /// A hierarchy over triangles, which it keeps in the order of its leaves.
@@ -26,10 +27,8 @@ impl Blas {
     /// The same with a choice between soon ready and fast to trace.
     #[must_use]
     pub fn build_with(triangles: &[[Vec3; 3]], quality: Quality) -> Self {
-        let _ = quality;
-        let bvh = Bvh::of_triangles(triangles);
-        let wide = WideBvh::new(&bvh, MAX_LEAF);
-        let leaves = Leaves::new(&wide, triangles);
+        let (wide, rows) = build_triangles(triangles, quality);
+        let leaves = Leaves::new(&wide, rows);
         Self { wide, leaves, isa: Isa::detect() }
     }
 

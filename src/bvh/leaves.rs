@@ -6,7 +6,7 @@ use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit};
-use super::wide::{Child, MAX_LEAF, WideBvh};
+use super::wide::{Child, MAX_LEAF, Part, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
 use std::ops::ControlFlow;
@@ -52,25 +52,25 @@ impl<F: Fn(usize, &Hit) -> bool + Copy> Filter for Only<F> {
     }
 }
 
-impl Leaves {
-    pub fn new(wide: &WideBvh, triangles: &[[Vec3; 3]]) -> Self {
-        let mut rows = vec![0.0; wide.prims.len() * 9 + MAX_LEAF];
-        for node in &wide.nodes {
-            for (slot, &child) in node.children.iter().enumerate() {
-                let Child::Leaf { first, count } = Child::unpack(child) else { continue };
-                if node.child_bounds(slot).is_empty() {
-                    continue;
-                }
-                let leaf = &mut rows[first * 9..(first + count) * 9];
-                for (i, &id) in wide.prims[first..first + count].iter().enumerate() {
-                    for (corner, p) in triangles[id as usize].iter().enumerate() {
-                        for axis in 0..3 {
-                            leaf[(corner * 3 + axis) * count + i] = p[axis];
-                        }
-                    }
+/// Writes the rows of a part of the leaves: those of the entries from `first` on, whose triangles are `ids`.
+pub(super) fn fill(part: &Part, first: usize, ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) {
+    for child in part.leaves() {
+        let Child::Leaf { first: start, count } = child else { continue };
+        let start = start - first;
+        let leaf = &mut rows[start * 9..(start + count) * 9];
+        for (i, &id) in ids[start..start + count].iter().enumerate() {
+            for (corner, p) in triangles[id as usize].iter().enumerate() {
+                for axis in 0..3 {
+                    leaf[(corner * 3 + axis) * count + i] = p[axis];
                 }
             }
         }
+    }
+}
+
+impl Leaves {
+    /// With rows that [`fill`] has filled.
+    pub fn new(wide: &WideBvh, rows: Vec<f32>) -> Self {
         Self { rows, ids: wide.prims.clone() }
     }
 

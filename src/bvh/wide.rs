@@ -4,9 +4,10 @@
 //! over the binary tree. Reference: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on
 //! GPUs Through Compressed Wide BVHs", HPG 2017, section 3.
 
-use super::build::MAX_DEPTH;
+use super::build::{MAX_DEPTH, Subtree};
 use super::{Aabb, Bvh, Defect, Node};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Children of a node.
 pub const WIDTH: usize = 8;
@@ -17,7 +18,7 @@ pub const MAX_LEAF: usize = 8;
 pub const MAX_WAITING: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 
 /// Four cache lines: the boxes of eight children, and what is in them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 pub struct WideNode {
     /// For x, y and z the children's least and their greatest. A child that is not there has an empty box,
@@ -105,25 +106,138 @@ struct Plan {
     count: u32,
 }
 
+/// A subtree as wide nodes, numbered from its own root.
+pub(super) struct Part {
+    nodes: Vec<WideNode>,
+    /// Box, and the number of entries.
+    root: Node,
+    cost: f32,
+    /// The first of `nodes`, or a leaf without any.
+    child: Child,
+}
+
+impl Part {
+    /// Merges the binary `nodes`, at least one, and leaves to such of at most `max_leaf` ≤ 8 entries where that
+    /// is cheaper.
+    pub fn new(nodes: &[Node], max_leaf: usize) -> Self {
+        let plans = plan(nodes, max_leaf, |node, area| area * leaf_cost(node.count));
+        let mut merge = Merge {
+            binary: nodes,
+            plans: &plans,
+            nodes: Vec::new(),
+            leaf: |first, count| Child::Leaf { first, count },
+        };
+        let child = merge.subtree();
+        let mut nodes = merge.nodes;
+        nodes.shrink_to_fit();
+        let root = Node { count: plans[0].count, ..merge.binary[0] };
+        Self { nodes, root, cost: plans[0].cost[0], child }
+    }
+
+    /// All leaves.
+    pub fn leaves(&self) -> impl Iterator<Item = Child> {
+        let alone = matches!(self.child, Child::Leaf { .. }).then_some(self.child);
+        let below = self.nodes.iter().flat_map(|node| {
+            let there = (0..WIDTH).filter(|&slot| !node.child_bounds(slot).is_empty());
+            there.map(|slot| Child::unpack(node.children[slot]))
+        });
+        alone.into_iter().chain(below).filter(|child| matches!(child, Child::Leaf { .. }))
+    }
+}
+
+/// Marks a child that is a [`Part`], by its number.
+const IS_PART: usize = 1 << 30;
+
+/// The whole of its parts; `prims` are the entries of their leaves.
+pub(super) fn join(tree: Subtree<Part>, prims: Vec<u32>) -> WideBvh {
+    let mut parts = Vec::new();
+    let mut binary = vec![EMPTY_BINARY];
+    collect(tree, 0, &mut binary, &mut parts);
+    let bounds = Aabb { min: binary[0].min, max: binary[0].max };
+    // Nodes above the parts, which are to them what leaves are to others.
+    let plans = plan(&binary, 0, |node, _| parts[node.first as usize].cost);
+    let mut merge = Merge {
+        binary: &binary,
+        plans: &plans,
+        nodes: Vec::new(),
+        leaf: |part, _| Child::Node(IS_PART + part),
+    };
+    let root = merge.subtree();
+    let mut upper = merge.nodes;
+    if let Child::Node(IS_PART) = root
+        && let Child::Leaf { .. } = parts[0].child
+    {
+        // A single leaf has nobody to carry its box.
+        let mut node = WideNode::EMPTY;
+        node.set_child(0, &binary[0], root);
+        node.sort();
+        upper.push(node);
+    }
+    let mut offsets = Vec::with_capacity(parts.len());
+    let mut total = upper.len();
+    for part in &parts {
+        offsets.push(total);
+        total += part.nodes.len();
+    }
+    for child in upper.iter_mut().flat_map(|node| &mut node.children) {
+        if let Child::Node(index) = Child::unpack(*child)
+            && index >= IS_PART
+        {
+            let part = index - IS_PART;
+            let root = parts[part].child;
+            *child = if let Child::Node(_) = root { Child::Node(offsets[part]) } else { root }.pack();
+        }
+    }
+    let mut nodes = bytemuck::zeroed_vec(total);
+    let (to_upper, mut rest) = nodes.split_at_mut(upper.len());
+    to_upper.copy_from_slice(&upper);
+    let mut places = Vec::with_capacity(parts.len());
+    for (part, offset) in parts.iter().zip(offsets) {
+        let (own, others) = rest.split_at_mut(part.nodes.len());
+        places.push((part, offset, own));
+        rest = others;
+    }
+    places.into_par_iter().for_each(|(part, offset, to)| {
+        for (to, node) in to.iter_mut().zip(&part.nodes) {
+            *to = *node;
+            for child in &mut to.children {
+                if let Child::Node(index) = Child::unpack(*child) {
+                    *child = Child::Node(index + offset).pack();
+                }
+            }
+        }
+    });
+    WideBvh { nodes, prims, bounds }
+}
+
+const EMPTY_BINARY: Node = Node { min: Vec3::ZERO, first: 0, max: Vec3::ZERO, count: 0 };
+
+/// Puts `tree` into the array of binary nodes, its root at `slot`, with parts as leaves.
+fn collect(tree: Subtree<Part>, slot: usize, nodes: &mut Vec<Node>, parts: &mut Vec<Part>) {
+    match tree {
+        Subtree::Done(part) => {
+            nodes[slot] = Node { first: parts.len() as u32, ..part.root };
+            parts.push(part);
+        }
+        Subtree::Inner(node, children) => {
+            let pair = nodes.len();
+            nodes[slot] = Node { first: pair as u32, ..node };
+            nodes.extend([EMPTY_BINARY; 2]);
+            let [left, right] = *children;
+            collect(left, pair, nodes, parts);
+            collect(right, pair + 1, nodes, parts);
+        }
+    }
+}
+
 impl WideBvh {
     /// Merges the nodes of `bvh`, and leaves to such of at most `max_leaf` ≤ 8 entries where that is cheaper.
     #[must_use]
     pub fn new(bvh: &Bvh, max_leaf: usize) -> Self {
-        let Some(root) = bvh.nodes.first() else { return Self::default() };
-        let plans = plan(bvh, max_leaf);
-        let mut merge =
-            Merge { bvh, plans: &plans, nodes: Vec::new(), prims: Vec::with_capacity(bvh.prims.len()) };
-        merge.nodes.push(WideNode::EMPTY);
-        if plans[0].left[0] == 0 {
-            let leaf = merge.leaf(0);
-            merge.nodes[0].set_child(0, root, leaf);
-            merge.nodes[0].sort();
-        } else {
-            merge.node(0, 0);
+        if bvh.nodes.is_empty() {
+            return Self::default();
         }
-        let Merge { mut nodes, prims, .. } = merge;
-        nodes.shrink_to_fit();
-        Self { nodes, prims, bounds: bvh.bounds() }
+        join(Subtree::Done(Part::new(&bvh.nodes, max_leaf)), bvh.prims.clone())
     }
 
     /// Bytes of the nodes.
@@ -133,14 +247,15 @@ impl WideBvh {
     }
 }
 
-fn plan(bvh: &Bvh, max_leaf: usize) -> Vec<Plan> {
+/// For each binary node. `cost` is that of a leaf, given also its area.
+fn plan(nodes: &[Node], max_leaf: usize, cost: impl Fn(&Node, f32) -> f32) -> Vec<Plan> {
     let empty = Plan { cost: [0.0; WIDTH - 1], left: [0; WIDTH - 1], count: 0 };
-    let mut plans = vec![empty; bvh.nodes.len()];
+    let mut plans = vec![empty; nodes.len()];
     // Children come after their parents.
-    for (i, node) in bvh.nodes.iter().enumerate().rev() {
+    for (i, node) in nodes.iter().enumerate().rev() {
         let area = Aabb { min: node.min, max: node.max }.half_area();
         plans[i] = if node.count > 0 {
-            let cost = area * leaf_cost(node.count);
+            let cost = cost(node, area);
             Plan { cost: [cost; WIDTH - 1], left: [0; WIDTH - 1], count: node.count }
         } else {
             let first = node.first as usize;
@@ -178,19 +293,30 @@ fn best_split(left: &Plan, right: &Plan, n: usize) -> (f32, u8) {
     best
 }
 
-struct Merge<'a> {
-    bvh: &'a Bvh,
+struct Merge<'a, L> {
+    binary: &'a [Node],
     plans: &'a [Plan],
     nodes: Vec<WideNode>,
-    prims: Vec<u32>,
+    /// What a leaf with the given first entry and number of entries becomes.
+    leaf: L,
 }
 
-impl Merge<'_> {
+impl<L: Fn(usize, usize) -> Child> Merge<'_, L> {
+    /// All of it.
+    fn subtree(&mut self) -> Child {
+        if self.plans[0].left[0] == 0 {
+            return self.leaf(0);
+        }
+        self.nodes.push(WideNode::EMPTY);
+        self.node(0, 0);
+        Child::Node(0)
+    }
+
     /// Fills wide node `index` with what is below binary node `root`.
     fn node(&mut self, index: usize, root: usize) {
         let mut roots = [0; WIDTH];
         let mut count = 0;
-        let first = self.bvh.nodes[root].first as usize;
+        let first = self.binary[root].first as usize;
         let left = usize::from(self.plans[root].left[0]);
         self.gather(first, left, &mut roots, &mut count);
         self.gather(first + 1, WIDTH - left, &mut roots, &mut count);
@@ -206,7 +332,7 @@ impl Merge<'_> {
                 self.node(below - 1, root);
                 Child::Node(below - 1)
             };
-            self.nodes[index].set_child(slot, &self.bvh.nodes[root], child);
+            self.nodes[index].set_child(slot, &self.binary[root], child);
         }
         self.nodes[index].sort();
     }
@@ -222,29 +348,20 @@ impl Merge<'_> {
             roots[*count] = root;
             *count += 1;
         } else {
-            let first = self.bvh.nodes[root].first as usize;
+            let first = self.binary[root].first as usize;
             let left = usize::from(plan.left[n - 1]);
             self.gather(first, left, roots, count);
             self.gather(first + 1, n - left, roots, count);
         }
     }
 
-    /// All entries below a binary node.
-    fn leaf(&mut self, root: usize) -> Child {
-        let first = self.prims.len();
-        self.entries(root);
-        Child::Leaf { first, count: self.prims.len() - first }
-    }
-
-    fn entries(&mut self, root: usize) {
-        let Node { first, count, .. } = self.bvh.nodes[root];
-        let first = first as usize;
-        if count > 0 {
-            self.prims.extend_from_slice(&self.bvh.prims[first..first + count as usize]);
-        } else {
-            self.entries(first);
-            self.entries(first + 1);
+    /// All entries below a binary node, which are neighbours.
+    fn leaf(&self, root: usize) -> Child {
+        let mut leftmost = &self.binary[root];
+        while leftmost.count == 0 {
+            leftmost = &self.binary[leftmost.first as usize];
         }
+        (self.leaf)(leftmost.first as usize, self.plans[root].count as usize)
     }
 }
 

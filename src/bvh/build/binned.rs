@@ -10,8 +10,9 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 /// A box to be sorted: the lower corner and the index in one vector, the upper corner in the other.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Prim {
+#[derive(Clone, Copy, Debug, bytemuck::Zeroable)]
+#[repr(C)]
+pub(in crate::bvh) struct Prim {
     lo: Vec4,
     hi: Vec4,
 }
@@ -46,6 +47,14 @@ impl Prim {
     pub fn new(aabb: Aabb, index: u32) -> Self {
         debug_assert!(index < INDEX_MARK >> 2);
         Self { lo: aabb.min.extend(f32::from_bits(INDEX_MARK | index)), hi: aabb.max.extend(0.0) }
+    }
+
+    /// What takes the place of something without a surface.
+    pub const NOTHING: Self = Self { lo: Vec4::NAN, hi: Vec4::NAN };
+
+    /// Whether there is something.
+    pub fn is_some(&self) -> bool {
+        self.hi.w == 0.0
     }
 
     pub fn index(&self) -> u32 {
@@ -95,29 +104,65 @@ fn half_area(lo: Vec4, hi: Vec4) -> f32 {
     d.x * d.y + d.y * d.z + d.z * d.x
 }
 
-/// What a subtree became, while threads are at it.
-enum Subtree {
-    /// Nodes numbered from the root of this subtree.
-    Done(Vec<Node>),
-    Inner(Node, Box<[Subtree; 2]>),
+/// What a subtree became.
+pub(in crate::bvh) enum Subtree<T> {
+    /// One thread's share, finished.
+    Done(T),
+    /// Its box is that of the node.
+    Inner(Node, Box<[Self; 2]>),
 }
 
-/// Builds over `prims`, at most `max_leaf` to a leaf unless they cannot be told apart.
-pub(super) fn build(mut prims: Vec<Prim>, max_leaf: usize) -> Bvh {
+/// What subtrees are written to, each to its own part: for each prim its index, and, unless there are
+/// none, a number of floats.
+pub(super) struct Output<'a> {
+    /// Of the first prim among all.
+    pub first: usize,
+    /// The prims' indices in the order of the leaves.
+    pub order: &'a mut [u32],
+    /// For whoever finishes the subtree.
+    pub rows: &'a mut [f32],
+}
+
+impl Output<'_> {
+    fn split(self, middle: usize) -> (Self, Self) {
+        let per_prim = self.rows.len() / self.order.len();
+        let (order, right_order) = self.order.split_at_mut(middle);
+        let (rows, right_rows) = self.rows.split_at_mut(per_prim * middle);
+        let right = Self { first: self.first + middle, order: right_order, rows: right_rows };
+        (Self { first: self.first, order, rows }, right)
+    }
+}
+
+/// Builds over `prims`, at least one, at most `max_leaf` to a leaf unless they cannot be told apart. `finish`
+/// gets the nodes of each subtree that one thread built, numbered from its root; their leaves' `first` are
+/// among all prims.
+pub(super) fn build<T: Send>(
+    mut prims: Vec<Prim>,
+    max_leaf: usize,
+    output: Output,
+    finish: &(impl Fn(Vec<Node>, Output) -> T + Sync),
+) -> Subtree<T> {
+    let extent = prims.par_chunks(PIECE).map(Extent::of).reduce(|| Extent::EMPTY, Extent::union);
+    // Zeroed memory comes when it is touched, by the thread that does.
+    let mut spare = bytemuck::zeroed_vec(prims.len());
+    large(&mut prims, &mut spare, output, extent, max_leaf, 0, finish)
+}
+
+/// The same without threads' shares.
+pub(super) fn build_binary(prims: Vec<Prim>, max_leaf: usize) -> Bvh {
     if prims.is_empty() {
         return Bvh::default();
     }
-    let extent = prims.par_chunks(PIECE).map(Extent::of).reduce(|| Extent::EMPTY, Extent::union);
-    let mut spare = prims.clone();
     let mut order = vec![0; prims.len()];
-    let tree = large(&mut prims, &mut spare, &mut order, 0, extent, max_leaf, 0);
+    let output = Output { first: 0, order: &mut order, rows: &mut [] };
+    let tree = build(prims, max_leaf, output, &|nodes, _| nodes);
     let mut nodes = vec![Node { min: Vec3::ZERO, first: 0, max: Vec3::ZERO, count: 0 }];
     assemble(tree, 0, &mut nodes);
     Bvh { nodes, prims: order }
 }
 
 /// Puts `tree` into the array, its root at `slot`.
-fn assemble(tree: Subtree, slot: usize, nodes: &mut Vec<Node>) {
+fn assemble(tree: Subtree<Vec<Node>>, slot: usize, nodes: &mut Vec<Node>) {
     match tree {
         Subtree::Done(own) => {
             // The root goes to its slot, the others to the end.
@@ -141,29 +186,30 @@ fn assemble(tree: Subtree, slot: usize, nodes: &mut Vec<Node>) {
     }
 }
 
-/// The subtree over `prims`, whose entries start at `first`; with threads while it is large.
-fn large(
+/// The subtree over `prims`; with threads while it is large.
+fn large<T: Send>(
     prims: &mut [Prim],
     spare: &mut [Prim],
-    order: &mut [u32],
-    first: usize,
+    output: Output,
     extent: Extent,
     max_leaf: usize,
     depth: usize,
-) -> Subtree {
+    finish: &(impl Fn(Vec<Node>, Output) -> T + Sync),
+) -> Subtree<T> {
     if prims.len() < TASK {
-        let mut nodes = vec![leaf(&extent, 0, 0)];
-        small(prims, spare, order, first, &extent, max_leaf, depth, 0, &mut nodes);
-        return Subtree::Done(nodes);
+        let mut nodes = Vec::with_capacity(prims.len());
+        nodes.push(leaf(&extent, 0, 0));
+        small(prims, spare, &mut *output.order, output.first, &extent, max_leaf, depth, 0, &mut nodes);
+        return Subtree::Done(finish(nodes, output));
     }
     let (middle, extents) = part(prims, spare, &extent, depth);
     let (left, right) = spare.split_at_mut(middle);
     let (left_spare, right_spare) = prims.split_at_mut(middle);
-    let (left_order, right_order) = order.split_at_mut(middle);
+    let (left_output, right_output) = output.split(middle);
     let [left_extent, right_extent] = extents;
     let (left, right) = rayon::join(
-        || large(left, left_spare, left_order, first, left_extent, max_leaf, depth + 1),
-        || large(right, right_spare, right_order, first + middle, right_extent, max_leaf, depth + 1),
+        || large(left, left_spare, left_output, left_extent, max_leaf, depth + 1, finish),
+        || large(right, right_spare, right_output, right_extent, max_leaf, depth + 1, finish),
     );
     Subtree::Inner(leaf(&extent, 0, 0), Box::new([left, right]))
 }

@@ -3,12 +3,14 @@
 mod binned;
 mod check;
 
+pub(super) use binned::Subtree;
 pub use check::Defect;
 
-use super::Aabb;
-use binned::Prim;
+use super::{Aabb, WideBvh, leaves, wide};
+use binned::{Output, Prim};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use wide::Part;
 
 /// 32 bytes, two to a cache line. Two children are neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,20 +58,7 @@ impl Bvh {
     #[must_use]
     pub fn build(boxes: &[Aabb]) -> Self {
         let prims = boxes.iter().zip(0..).map(|(aabb, index)| Prim::new(*aabb, index)).collect();
-        binned::build(prims, 1)
-    }
-
-    /// Builds over the `triangles` that have a surface.
-    #[must_use]
-    pub fn of_triangles(triangles: &[[Vec3; 3]]) -> Self {
-        let prims: Vec<Prim> = triangles
-            .par_iter()
-            .enumerate()
-            .with_min_len(4096)
-            .filter(|(_, corners)| has_surface(corners))
-            .map(|(index, corners)| Prim::new(Aabb::around(corners), index as u32))
-            .collect();
-        binned::build(prims, MAX_LEAF)
+        binned::build_binary(prims, 1)
     }
 
     /// The box around everything; empty if there is nothing.
@@ -77,6 +66,39 @@ impl Bvh {
     pub fn bounds(&self) -> Aabb {
         self.nodes.first().map_or(Aabb::EMPTY, |root| Aabb { min: root.min, max: root.max })
     }
+}
+
+/// The `triangles` that have a surface, as boxes.
+fn prims_of(triangles: &[[Vec3; 3]]) -> Vec<Prim> {
+    let prim = |(index, corners): (usize, &[Vec3; 3])| {
+        if has_surface(corners) { Prim::new(Aabb::around(corners), index as u32) } else { Prim::NOTHING }
+    };
+    let mut prims: Vec<Prim> = triangles.par_iter().enumerate().with_min_len(4096).map(prim).collect();
+    // Hardly ever anything to do.
+    if !prims.par_iter().with_min_len(4096).all(Prim::is_some) {
+        prims.retain(Prim::is_some);
+    }
+    prims
+}
+
+/// Wide hierarchy and rows of corners over `triangles`.
+pub(super) fn build_triangles(triangles: &[[Vec3; 3]], quality: Quality) -> (WideBvh, Vec<f32>) {
+    let _ = quality;
+    let prims = prims_of(triangles);
+    if prims.is_empty() {
+        return (WideBvh::default(), Vec::new());
+    }
+    let mut order = vec![0; prims.len()];
+    // A leaf's last vector may reach beyond its own rows.
+    let mut rows = vec![0.0; prims.len() * 9 + wide::MAX_LEAF];
+    let output = Output { first: 0, order: &mut order, rows: &mut rows[..prims.len() * 9] };
+    let tree = binned::build(prims, MAX_LEAF, output, &|nodes, output| {
+        let part = Part::new(&nodes, wide::MAX_LEAF);
+        leaves::fill(&part, output.first, output.order, output.rows, triangles);
+        part
+    });
+    let wide = wide::join(tree, order);
+    (wide, rows)
 }
 
 /// Judged in double precision, where differences and products of f32 are exact or nearly so.
