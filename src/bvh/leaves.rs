@@ -5,7 +5,7 @@ use super::packet::Packet;
 use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, three};
-use super::triangle::{Edges, Shear, TriangleHit};
+use super::triangle::{Edges, Shear, TriangleHit, within};
 use super::wide::{Child, MAX_LEAF, Part, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
@@ -107,7 +107,7 @@ impl Leaves {
         let rows = &self.rows[first * 9..first * 9 + count * 9 + MAX_LEAF];
         let splat = |x: f32| S::F8::splat(simd, x);
         let mut candidates = lowest(count) as u32;
-        let (mut certain, mut near) = (0, 0);
+        let (mut certain, mut doubtful) = (0, 0);
         let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
         if !probe.extreme {
             let shear = Shear {
@@ -122,22 +122,22 @@ impl Leaves {
             let distance = shear.distance(simd, &edges);
             let on_edge = distance.on_edge.bits();
             certain = distance.ahead.and(distance.t.le(splat(t_max))).bits() & !on_edge;
-            near = distance.near.bits() & !on_edge;
-            candidates &= certain | near | on_edge;
+            doubtful = distance.doubtful.bits() & !on_edge;
+            candidates &= certain | doubtful | on_edge;
             distance.t.store(&mut ts);
             (edges.weights[1] * distance.inverse_determinant).store(&mut us);
             (edges.weights[2] * distance.inverse_determinant).store(&mut vs);
         }
         for i in each(u64::from(candidates)) {
             let i = i % MAX_LEAF;
-            let corners = Self::corners(rows, count, i);
+            let corners = || Self::corners(rows, count, i);
             let rough = TriangleHit { t: ts[i], u: us[i], v: vs[i] };
             let found = if certain >> i & 1 != 0 {
-                probe.clamped(&corners, rough.t, rough.u, rough.v, t_max)
-            } else if near >> i & 1 != 0 {
-                probe.near_triangle(&corners, rough, t_max)
+                within(rough, t_max)
+            } else if doubtful >> i & 1 != 0 {
+                probe.doubtful_triangle(&corners(), t_max)
             } else {
-                probe.triangle(&corners, t_max)
+                probe.triangle(&corners(), t_max)
             };
             if let Some(found) = found {
                 let triangle = self.ids[first + i];
@@ -192,14 +192,13 @@ impl Leaves {
                 let distance = shear.distance(simd, &edges);
                 let on_edge = distance.on_edge.bits() & inside;
                 let certain = distance.ahead.bits() & inside & !on_edge;
-                let near = distance.near.bits() & inside & !on_edge;
+                let doubtful = distance.doubtful.bits() & inside & !on_edge;
                 let t_max: S::F16 = packet.rays.t_max.get(simd, group);
                 let u = edges.weights[1] * distance.inverse_determinant;
                 let v = edges.weights[2] * distance.inverse_determinant;
-                let mut rough_t = distance.t;
-                let mut one_by_one = near | on_edge | extreme;
+                let mut one_by_one = doubtful | on_edge | extreme;
                 if certain != 0 {
-                    let t = distance.t.max(packet.entry::<S>(simd, group, &corners));
+                    let t = distance.t;
                     let closer = certain & t.lt(t_max).bits();
                     let equal = certain & t.eq(t_max).bits();
                     if ANY && F::ALL {
@@ -210,13 +209,12 @@ impl Leaves {
                     } else {
                         one_by_one |= closer | equal;
                     }
-                    rough_t = S::F16::select(certain, t, rough_t);
                 }
                 if one_by_one == 0 {
                     continue;
                 }
                 let (mut ts, mut us, mut vs) = ([0.0; GROUP], [0.0; GROUP], [0.0; GROUP]);
-                rough_t.store(&mut ts);
+                distance.t.store(&mut ts);
                 u.store(&mut us);
                 v.store(&mut vs);
                 for k in each(u64::from(one_by_one)) {
@@ -226,8 +224,8 @@ impl Leaves {
                     let t_max = packet.rays.t_max.0[lane % PACKET];
                     let hit = if certain >> k & 1 != 0 {
                         Some(rough)
-                    } else if near >> k & 1 != 0 {
-                        packet.probe(lane).near_triangle(&corners, rough, t_max)
+                    } else if doubtful >> k & 1 != 0 {
+                        packet.probe(lane).doubtful_triangle(&corners, t_max)
                     } else {
                         packet.probe(lane).triangle(&corners, t_max)
                     };

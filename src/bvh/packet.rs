@@ -137,19 +137,6 @@ impl Packet {
         }
     }
 
-    /// Where a group of rays enters the box of a triangle, if it does.
-    #[inline(always)]
-    pub fn entry<S: Simd>(&self, simd: S, group: usize, corners: &[Vec3; 3]) -> S::F16 {
-        let [a, b, c] = *corners;
-        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
-        let enter = |axis: usize| {
-            let side = if self.octant >> axis & 1 == 0 { min[axis] } else { max[axis] };
-            (S::F16::splat(simd, side) - self.near_origin[axis].get(simd, group))
-                * self.inverse[axis].get(simd, group)
-        };
-        enter(0).max(enter(1)).max(enter(2).max(S::F16::splat(simd, 0.0)))
-    }
-
     /// By which side of boxes the rays come in along an axis: 0 for the less, 1 for the greater.
     #[inline(always)]
     fn near_side(&self, axis: usize) -> usize {

@@ -1,12 +1,13 @@
 //! A ray made ready for boxes and triangles.
 
+use super::triangle::THIN;
 use super::{Aabb, Ray};
 use glam::{Vec3, Vec3A};
 
 /// A [`Ray`] prepared for everything inside one bounding box.
 ///
-/// The triangle test decides with a slightly moved ray: shearing and the edge functions round, by
-/// at most 5 units of 2⁻²⁴ of the largest distances involved. The box test must not be stricter, or
+/// The triangle test decides with a slightly moved ray, and so says where it is hit: all of it rounds, by
+/// at most [`SLACK`] of the largest distances involved. The box test must not be stricter, or
 /// rays slip through between boxes; so it starts from an origin moved outward by that bound, taken
 /// over the whole bounding box once per ray (it costs nothing per node).
 ///
@@ -41,8 +42,10 @@ pub(super) fn largest_axis(v: Vec3) -> usize {
     if v.z > v.x.max(v.y) { 2 } else { of_xy }
 }
 
-/// 5 units from the triangle test, 3 from the box test's own operations, rounded up.
-pub(super) const SLACK: f32 = 12.0 / (1 << 24) as f32;
+/// How far from its triangle a hit may be taken to be, in units of 2⁻²⁴ of the largest coordinates: by shearing
+/// 5, which move corners; by products in the edge functions, which move weights, 6 / [`THIN`]; by the mean
+/// of the distances 5. And 3 for the box test's own operations, rounded up.
+pub(super) const SLACK: f32 = (14.0 + 6.0 / THIN) / (1 << 24) as f32;
 /// Beyond this distance, or if all is nearer than its reciprocal, products in single precision might
 /// overflow or vanish.
 pub(super) const EXTREME: f32 = (1u64 << 40) as f32;
@@ -101,15 +104,10 @@ impl Probe {
     #[inline]
     #[must_use]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
-        let (near, far) = self.span(min, max);
-        (near <= far.min(t_max)).then_some(near)
-    }
-
-    #[inline]
-    pub(super) fn span(&self, min: Vec3, max: Vec3) -> (f32, f32) {
         let backward = self.direction.is_negative_mask();
         let near = (Vec3::select(backward, max, min) - self.near_origin) * self.inverse;
         let far = (Vec3::select(backward, min, max) - self.far_origin) * self.inverse;
-        (near.max_element().max(0.0), far.min_element())
+        let near = near.max_element().max(0.0);
+        (near <= far.min_element().min(t_max)).then_some(near)
     }
 }

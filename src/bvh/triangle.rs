@@ -31,9 +31,15 @@ pub(super) struct Shear<V> {
     pub shear: [V; 3],
 }
 
+/// Of triangles whose shadow along the ray is thinner than this, compared with the box around it and the ray,
+/// the distance is measured again in double precision. [`super::probe::SLACK`] follows from it.
+pub(super) const THIN: f32 = 1.0 / 8.0;
+
 /// Where rays pass the edges of triangles.
 #[derive(Clone, Copy)]
 pub(super) struct Edges<V> {
+    /// The corners' distances from the ray, along two axes.
+    pub offsets: [[V; 2]; 3],
     /// Twice the areas of the triangles between the ray and the edge opposite to each corner.
     pub weights: [V; 3],
     /// The corners' distances along the last axis.
@@ -45,12 +51,10 @@ pub(super) struct Edges<V> {
 pub(super) struct Distance<V: Lanes> {
     pub t: V,
     pub inverse_determinant: V,
-    /// Of the farthest corner, in multiples of the direction.
-    pub reach: V,
-    /// In front, and far enough for `t` to be trusted.
+    /// In front, and `t` can be trusted.
     pub ahead: V::Mask,
-    /// So near that `t` has to be measured again.
-    pub near: V::Mask,
+    /// So near or so thin that it has to be measured again.
+    pub doubtful: V::Mask,
     /// Exactly through an edge, as far as single precision can tell: nothing is known.
     pub on_edge: V::Mask,
 }
@@ -65,7 +69,11 @@ impl<V: Lanes> Shear<V> {
     #[inline(always)]
     pub fn edges(&self, corners: [[V; 3]; 3]) -> Edges<V> {
         let [a, b, c] = [self.moved(corners[0]), self.moved(corners[1]), self.moved(corners[2])];
-        Edges { weights: [edge(c, b), edge(a, c), edge(b, a)], depths: [a[2], b[2], c[2]] }
+        Edges {
+            offsets: [[a[0], a[1]], [b[0], b[1]], [c[0], c[1]]],
+            weights: [edge(c, b), edge(a, c), edge(b, a)],
+            depths: [a[2], b[2], c[2]],
+        }
     }
 
     #[inline(always)]
@@ -88,7 +96,12 @@ impl<V: Lanes> Shear<V> {
         let surely_behind = reach * V::splat(proof, BEHIND);
         let inverse_determinant = V::splat(proof, 1.0) / determinant;
         let near = t.le(cancels).and(surely_behind.le(t));
-        Distance { t, inverse_determinant, reach, ahead: cancels.lt(t), near, on_edge }
+        let [a, b, c] = edges.offsets;
+        let extent = |i: usize| a[i].abs().max(b[i].abs()).max(c[i].abs());
+        let least = extent(0) * extent(1) * V::splat(proof, THIN);
+        let area = determinant.abs();
+        let ahead = cancels.lt(t).and(least.le(area));
+        Distance { t, inverse_determinant, ahead, doubtful: near.or(area.lt(least)), on_edge }
     }
 }
 
@@ -106,12 +119,13 @@ impl Probe {
     /// Where the ray meets the triangle, if at 0 < t ≤ `t_max`.
     ///
     /// Two triangles with a common edge decide about it with the very same operations, so no ray
-    /// passes between them. `t` is never below where [`Probe::enter`] enters the triangle's box,
-    /// hence a search that skips boxes beyond the best hit finds what trying all triangles finds.
+    /// passes between them. The point at `t` is so near to one of the triangle's that [`Probe::enter`] enters
+    /// every box around that one at or before `t`: hence a search that skips boxes beyond the best hit, be
+    /// they of whole triangles or of their parts, finds what trying all triangles finds.
     #[must_use]
     pub fn triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
         if self.extreme {
-            return self.extreme_triangle(corners, t_max);
+            return within(self.extreme_triangle(corners)?, t_max);
         }
         let one = |x: f32| One::splat(Plain, x);
         let [x, y, z] = AXES[self.axis];
@@ -126,29 +140,49 @@ impl Probe {
             edges.weights = self.exact_weights(corners)?.map(one);
         }
         let distance = shear.distance(Plain, &edges);
-        let mut t = distance.t.get();
-        let reach = distance.reach.get();
-        if t <= reach * CANCELLATION {
-            if t < reach * BEHIND {
-                return None;
-            }
-            t = self.plane_distance(corners).unwrap_or(t);
+        if distance.doubtful.bits() != 0 {
+            return self.doubtful_triangle(corners, t_max);
         }
         let [_, v, w] = edges.weights;
         let inverse = distance.inverse_determinant;
-        self.clamped(corners, t, (v * inverse).get(), (w * inverse).get(), t_max)
+        within(TriangleHit { t: distance.t.get(), u: (v * inverse).get(), v: (w * inverse).get() }, t_max)
     }
 
-    /// The end of [`Probe::triangle`] for a near hit whose barycentrics are known.
-    #[inline(always)]
-    pub(super) fn near_triangle(
-        &self,
-        corners: &[Vec3; 3],
-        rough: TriangleHit,
-        t_max: f32,
-    ) -> Option<TriangleHit> {
-        let t = self.plane_distance(corners).unwrap_or(rough.t);
-        self.clamped(corners, t, rough.u, rough.v, t_max)
+    /// The end of [`Probe::triangle`] where single precision has decided that the triangle is hit, but cannot
+    /// say how far away: at that of its points which is nearest to the ray.
+    ///
+    /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to the
+    /// origin of the ray that is not enough: a ray that starts on a large triangle would hit it. And the
+    /// weights themselves are mostly rounding where the triangle is thin.
+    pub(super) fn doubtful_triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
+        let [x, y, z] = AXES[self.axis];
+        let direction = self.direction.as_dvec3();
+        let (shear_x, shear_y) = (direction[x] / direction[z], direction[y] / direction[z]);
+        let p = corners.map(|p| {
+            let p = p.as_dvec3() - self.origin.as_dvec3();
+            DVec3::new(p[x] - shear_x * p[z], p[y] - shear_y * p[z], p[z])
+        });
+        let edge = |p: DVec3, q: DVec3| p.x * q.y - p.y * q.x;
+        let weights = DVec3::new(edge(p[2], p[1]), edge(p[0], p[2]), edge(p[1], p[0]));
+        let determinant = weights.element_sum();
+        let outside = weights.min_element() < 0.0 && weights.max_element() > 0.0;
+        let weights =
+            if outside || determinant == 0.0 { nearest_on_border(&p) } else { weights / determinant };
+        let depth = weights.x * p[0].z + weights.y * p[1].z + weights.z * p[2].z;
+        // A ray away from the plane is away from the triangle, whatever its border is nearest to.
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let normal = (b - a).cross(c - a);
+        let plane = normal.dot(a - self.origin.as_dvec3()) / normal.dot(direction);
+        let t = if plane.is_nan() || outside { depth / direction[z] } else { plane };
+        let leaves = plane <= 0.0 && t <= self.reach_of(&p) * f64::from(CANCELLATION);
+        let hit = TriangleHit { t: t as f32, u: weights.y as f32, v: weights.z as f32 };
+        if leaves { None } else { within(hit, t_max) }
+    }
+
+    /// Of the farthest corner, in multiples of the direction.
+    fn reach_of(&self, corners: &[DVec3; 3]) -> f64 {
+        let [a, b, c] = corners.map(|p| p.z.abs());
+        a.max(b).max(c) * f64::from(self.shear.z.abs())
     }
 
     /// The edge functions of the sheared corners in double precision, where their products are exact;
@@ -166,21 +200,9 @@ impl Probe {
         (!outside && weights.iter().sum::<f32>() != 0.0).then_some(weights)
     }
 
-    /// t of the triangle's plane in double precision; `None` for a ray in the plane.
-    ///
-    /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to
-    /// the origin of the ray that is not enough: a ray that starts on a large triangle would hit it.
-    #[inline(always)]
-    fn plane_distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let normal = (b - a).cross(c - a);
-        let t = normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3());
-        t.is_finite().then_some(t as f32)
-    }
-
     /// The same in double precision, for coordinates whose products overflow or vanish.
     #[cold]
-    fn extreme_triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
+    fn extreme_triangle(&self, corners: &[Vec3; 3]) -> Option<TriangleHit> {
         let [x, y, z] = AXES[self.axis];
         let shear = self.shear.as_dvec3();
         let [a, b, c] = corners.map(|p| {
@@ -198,25 +220,34 @@ impl Probe {
             return None;
         }
         let t = (u * a.z + v * b.z + w * c.z) / determinant;
-        self.clamped(corners, t as f32, (v / determinant) as f32, (w / determinant) as f32, t_max)
+        let [t, u, v] = [t, v / determinant, w / determinant].map(|x| x as f32);
+        Some(TriangleHit { t, u, v })
     }
+}
 
-    #[inline(always)]
-    pub(super) fn clamped(
-        &self,
-        corners: &[Vec3; 3],
-        t: f32,
-        u: f32,
-        v: f32,
-        t_max: f32,
-    ) -> Option<TriangleHit> {
-        // Also false for NaN.
-        if !(t > 0.0 && t <= t_max) {
-            return None;
+/// A hit that counts.
+#[inline(always)]
+pub(super) fn within(hit: TriangleHit, t_max: f32) -> Option<TriangleHit> {
+    // False for NaN too.
+    (hit.t > 0.0 && hit.t <= t_max).then_some(hit)
+}
+
+/// Weights of the point on the triangle's border that is nearest to the origin in x and y.
+fn nearest_on_border(corners: &[DVec3; 3]) -> DVec3 {
+    let mut best = (f64::INFINITY, DVec3::X);
+    for i in 0..3 {
+        let k = (i + 1) % 3;
+        let (p, q) = (corners[i].truncate(), corners[k].truncate());
+        let along = q - p;
+        let length2 = along.length_squared();
+        let s = if length2 > 0.0 { (-p.dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
+        let distance2 = (p + along * s).length_squared();
+        if distance2 < best.0 {
+            let mut weights = DVec3::ZERO;
+            weights[i] = 1.0 - s;
+            weights[k] = s;
+            best = (distance2, weights);
         }
-        let [a, b, c] = *corners;
-        let (near, _) = self.span(a.min(b).min(c), a.max(b).max(c));
-        let t = t.max(near);
-        (t <= t_max).then_some(TriangleHit { t, u, v })
     }
+    best.1
 }

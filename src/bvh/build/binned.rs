@@ -57,6 +57,10 @@ impl Prim {
         self.hi.w == 0.0
     }
 
+    pub fn aabb(&self) -> Aabb {
+        Aabb { min: self.lo.xyz(), max: self.hi.xyz() }
+    }
+
     pub fn index(&self) -> u32 {
         self.lo.w.to_bits() & !INDEX_MARK
     }

@@ -2,6 +2,7 @@
 
 mod binned;
 mod check;
+mod split;
 
 pub(super) use binned::Subtree;
 pub use check::Defect;
@@ -84,7 +85,7 @@ fn prims_of(triangles: &[[Vec3; 3]]) -> Vec<Prim> {
 /// Wide hierarchy and rows of corners over `triangles`.
 pub(super) fn build_triangles(triangles: &[[Vec3; 3]], quality: Quality) -> (WideBvh, Vec<f32>) {
     let _ = quality;
-    let prims = prims_of(triangles);
+    let prims = split::split(prims_of(triangles), triangles);
     if prims.is_empty() {
         return (WideBvh::default(), Vec::new());
     }
