@@ -2,20 +2,18 @@
 
 use crate::engine::{Engine, Hit, MISS, Ray, Tri};
 use glam::Vec3;
-use penumbra::bvh::{self, Blas, Quality};
+use penumbra::bvh::{self, Blas};
 
-/// `QUALITY` 0: the interactive builder; 1: the one that replaces it while the picture rests.
-pub struct Penumbra<const QUALITY: u8>(Blas);
+pub struct Penumbra(Blas);
 
 #[inline(always)]
 fn ray(ray: &Ray) -> bvh::Ray {
     bvh::Ray { origin: Vec3::from_array(ray.o), direction: Vec3::from_array(ray.d), t_max: ray.tmax }
 }
 
-impl<const QUALITY: u8> Engine for Penumbra<QUALITY> {
+impl Engine for Penumbra {
     fn build(tris: &[Tri], _threads: usize) -> Self {
-        let quality = if QUALITY == 0 { Quality::Interactive } else { Quality::Rested };
-        Self(Blas::build_with(bytemuck::cast_slice(tris), quality))
+        Self(Blas::build(bytemuck::cast_slice(tris)))
     }
 
     fn closest(&self, r: &Ray) -> Option<(f32, u32)> {

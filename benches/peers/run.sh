@@ -19,7 +19,7 @@ cp "$here/penumbra.rs" "$copy/kernels/src/engines/"
 
 engines=$copy/kernels/src/engines/mod.rs
 sed -i -e '0,/^pub mod/s//pub mod penumbra;\npub mod/' \
-    -e 's|^\( *\)v.push(reg!("bvh-iter".*|\1v.push(reg!("penumbra", penumbra::Penumbra<0>));\n\1v.push(reg!("penumbra-rested", penumbra::Penumbra<1>));\n&|' "$engines"
+    -e 's|^\( *\)v.push(reg!("bvh-iter".*|\1v.push(reg!("penumbra", penumbra::Penumbra));\n&|' "$engines"
 cat >>"$copy/kernels/Cargo.toml" <<TOML
 
 [dependencies.penumbra]

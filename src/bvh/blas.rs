@@ -5,7 +5,7 @@ use super::build::build_triangles;
 use super::leaves::{All, Filter, Leaves};
 use super::simd::{Isa, Simd};
 use super::wide::{WideBvh, WideNode};
-use super::{Aabb, Hit, Probe, Quality, Ray};
+use super::{Aabb, Hit, Probe, Ray};
 use glam::Vec3;
 
 /// A hierarchy over triangles, which it keeps in the order of its leaves.
@@ -21,13 +21,7 @@ impl Blas {
     /// that is not finite have no surface and are never hit.
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
-        Self::build_with(triangles, Quality::default())
-    }
-
-    /// The same with a choice between soon ready and fast to trace.
-    #[must_use]
-    pub fn build_with(triangles: &[[Vec3; 3]], quality: Quality) -> Self {
-        let (wide, rows) = build_triangles(triangles, quality);
+        let (wide, rows) = build_triangles(triangles);
         let leaves = Leaves::new(&wide, rows);
         Self { wide, leaves, isa: Isa::detect() }
     }

@@ -43,16 +43,6 @@ pub const MAX_DEPTH: usize = SAH_LEVELS + 32;
 /// Beyond this many triangles a leaf is always split.
 const MAX_LEAF: usize = 4;
 
-/// How much work goes into a hierarchy. What is hit is the same, bit for bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Quality {
-    /// Soon ready: for what was just opened or changed.
-    #[default]
-    Interactive,
-    /// Fast to trace: for a view that somebody looks at for some seconds.
-    Rested,
-}
-
 impl Bvh {
     /// Builds over `boxes`, all finite and not empty, each in a leaf of its own. There may be none, or many
     /// equal ones.
@@ -83,8 +73,7 @@ fn prims_of(triangles: &[[Vec3; 3]]) -> Vec<Prim> {
 }
 
 /// Wide hierarchy and rows of corners over `triangles`.
-pub(super) fn build_triangles(triangles: &[[Vec3; 3]], quality: Quality) -> (WideBvh, Vec<f32>) {
-    let _ = quality;
+pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     let prims = split::split(prims_of(triangles), triangles);
     if prims.is_empty() {
         return (WideBvh::default(), Vec::new());

@@ -43,7 +43,7 @@ pub(super) fn split(prims: Vec<Prim>, triangles: &[[Vec3; 3]]) -> Vec<Prim> {
         .collect();
     let [all, slivers, roots] = sums.iter().fold([0.0; 3], |[a, b, c], s| [a + s[0], b + s[1], c + s[2]]);
     let pays = slivers > WORTH_SPLITTING * all;
-    if !pays || !(roots > 0.0 && roots.is_finite()) {
+    if !(pays && roots > 0.0 && roots.is_finite()) {
         return prims;
     }
     let bounds = prims.iter().fold(Aabb::EMPTY, |bounds, prim| bounds.union(prim.aabb()));
