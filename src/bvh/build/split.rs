@@ -160,3 +160,49 @@ fn around(p: DVec3) -> Aabb {
     let p = p.as_vec3();
     Aabb { min: p.map(f32::next_down), max: p.map(f32::next_up) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::build::prims_of;
+
+    fn needles() -> Vec<[Vec3; 3]> {
+        (0..50)
+            .map(|i| {
+                let at = Vec3::new((i % 7) as f32, (i % 5) as f32, i as f32 * 0.1);
+                [at, at + Vec3::new(9.0, 8.0, 7.0), at + Vec3::new(9.0, 8.001, 7.0)]
+            })
+            .collect()
+    }
+
+    /// Whether every one of many points of each triangle is in one of its parts.
+    fn covered(triangles: &[[Vec3; 3]], parts: &[Prim]) -> bool {
+        triangles.iter().zip(0..).all(|(corners, index)| {
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
+            (0..1000).all(|k| {
+                let (u, v) = (f64::from(k % 40) / 39.0, f64::from(k / 40) / 24.0);
+                let p = a * (1.0 - u) + (b * (1.0 - v) + c * v) * u;
+                let inside =
+                    |part: &Aabb| p.cmpge(part.min.as_dvec3()).all() && p.cmple(part.max.as_dvec3()).all();
+                parts.iter().any(|part| part.index() == index && inside(&part.aabb()))
+            })
+        })
+    }
+
+    #[test]
+    fn the_parts_of_a_triangle_cover_it() {
+        let triangles = needles();
+        let mut parts = split(prims_of(&triangles), &triangles);
+        assert!(parts.len() > 10 * triangles.len(), "{} parts", parts.len());
+        assert!(covered(&triangles, &parts));
+        parts.remove(parts.len() / 2);
+        assert!(!covered(&triangles, &parts), "one is missing");
+    }
+
+    #[test]
+    fn what_fills_its_boxes_is_not_split() {
+        let fat: Vec<_> =
+            (0..50).map(|i| [Vec3::X, Vec3::Y, Vec3::ZERO].map(|p| p + Vec3::Z * i as f32)).collect();
+        assert_eq!(split(prims_of(&fat), &fat).len(), fat.len());
+    }
+}
