@@ -182,8 +182,11 @@ mod tests {
             (0..1000).all(|k| {
                 let (u, v) = (f64::from(k % 40) / 39.0, f64::from(k / 40) / 24.0);
                 let p = a * (1.0 - u) + (b * (1.0 - v) + c * v) * u;
-                let inside =
-                    |part: &Aabb| p.cmpge(part.min.as_dvec3()).all() && p.cmple(part.max.as_dvec3()).all();
+                // The point itself is rounded.
+                let room = DVec3::splat(1e-12);
+                let inside = |part: &Aabb| {
+                    (p + room).cmpge(part.min.as_dvec3()).all() && (p - room).cmple(part.max.as_dvec3()).all()
+                };
                 parts.iter().any(|part| part.index() == index && inside(&part.aabb()))
             })
         })
