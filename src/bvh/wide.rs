@@ -399,16 +399,18 @@ impl WideNode {
             let bounds = self.child_bounds(slot);
             if bounds.is_empty() { Vec3::INFINITY } else { bounds.center() }
         });
-        for (octant, order) in self.orders.iter_mut().enumerate() {
+        for octant in 0..4 {
             let sign = |axis: usize| if octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
             let diagonal = Vec3::new(sign(0), sign(1), sign(2));
             let mut slots: [(f32, u32); WIDTH] = std::array::from_fn(|slot| {
-                // Empty ones last, that is, nearest: they are never entered.
+                // Empty ones last; they are never entered.
                 let along = middles[slot].dot(diagonal);
                 (if along.is_finite() { -along } else { f32::INFINITY }, slot as u32)
             });
             slots.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            *order = slots.iter().enumerate().fold(0, |order, (i, &(_, slot))| order | slot << (3 * i));
+            let in_order = |order: u32, (i, &(_, slot)): (usize, &(f32, u32))| order | slot << (3 * i);
+            self.orders[octant] = slots.iter().enumerate().fold(0, in_order);
+            self.orders[7 - octant] = slots.iter().rev().enumerate().fold(0, in_order);
         }
     }
 }

@@ -259,6 +259,10 @@ fn pays(prims: &[Prim], extent: &Extent, max_leaf: usize) -> bool {
     if prims.len() < 2 || max_leaf < 2 {
         return false;
     }
+    if let [a, b] = prims {
+        return NODE_COST * half_area(extent.lo, extent.hi) + half_area(a.lo, a.hi) + half_area(b.lo, b.hi)
+            < 2.0 * half_area(extent.lo, extent.hi);
+    }
     let Some((cost, _)) = best_plane(&Bins::<4>::with(prims, Grid::new(extent, 4))) else { return false };
     let area = half_area(extent.lo, extent.hi);
     NODE_COST * area + cost < area * prims.len() as f32
@@ -270,8 +274,10 @@ fn pays(prims: &[Prim], extent: &Extent, max_leaf: usize) -> bool {
 fn part(prims: &[Prim], spare: &mut [Prim], extent: &Extent, depth: usize) -> (usize, [Extent; 2]) {
     let parted = match prims.len() {
         _ if depth >= SAH_LEVELS => None,
-        0..12 => part_binned::<4>(prims, spare, extent),
-        12..64 => part_binned::<8>(prims, spare, extent),
+        // One way only.
+        0..3 => None,
+        3..12 => part_binned::<4>(prims, spare, extent),
+        12..192 => part_binned::<8>(prims, spare, extent),
         _ => part_binned::<16>(prims, spare, extent),
     };
     parted.unwrap_or_else(|| {
