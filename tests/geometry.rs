@@ -342,6 +342,57 @@ fn opening_an_edge_lets_rays_out() {
     assert!(blas.closest_hit(&Ray::new(Vec3::ZERO, hole.iter().sum::<Vec3>() / 3.0)).is_none());
 }
 
+#[test]
+fn a_refitted_hierarchy_hits_what_a_new_one_hits() {
+    let triangles: Vec<[Vec3; 3]> = (0..1600)
+        .flat_map(|k| {
+            let point = |di: usize, dj: usize| {
+                let (x, z) = ((k % 40 + di) as f32 * 0.05 - 1.0, (k / 40 + dj) as f32 * 0.05 - 1.0);
+                Vec3::new(x, 0.2 * (x * 9.0).sin() * (z * 7.0).cos(), z)
+            };
+            let [a, b, c, d] = [point(0, 0), point(1, 0), point(1, 1), point(0, 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    let blas = Blas::build(&triangles);
+    let bend = |amount: f32| -> Vec<[Vec3; 3]> {
+        triangles.iter().map(|t| t.map(|p| p + Vec3::Y * (p.x * 3.0).sin() * amount)).collect()
+    };
+    let mut rng = Rng(31);
+    let mut refitted = blas.clone();
+    for amount in [0.1, 0.2, 0.0] {
+        let moved = bend(amount);
+        refitted = refitted.refit(&moved).expect("bent a little");
+        assert_eq!(check(&refitted, &moved), Ok(()));
+        for _ in 0..1000 {
+            let ray = aimed_ray(&mut rng, &moved, 2.0, Vec3::ZERO);
+            assert_eq!(refitted.closest_hit(&ray), brute_force(&moved, &ray));
+        }
+    }
+    assert_eq!(refitted.cost(), blas.cost(), "bent back");
+    // Many small steps do not wear it out unseen.
+    let apart = |step: usize| -> Vec<[Vec3; 3]> {
+        let mut rng = Rng(5);
+        triangles
+            .iter()
+            .map(|t| (t, rng.vec()))
+            .map(|(t, v)| t.map(|p| p + v * 0.002 * step as f32))
+            .collect()
+    };
+    assert!(blas.refit(&apart(1)).is_some());
+    assert!((1..200).try_fold(blas.clone(), |blas, step| blas.refit(&apart(step))).is_none());
+    assert!(blas.refit(&triangles[1..]).is_none(), "one is missing");
+    let mut shuffled = triangles.clone();
+    shuffled.reverse();
+    assert!(blas.refit(&shuffled).is_none(), "all are elsewhere");
+    let mut without_place = triangles.clone();
+    without_place[7][1].x = f32::NAN;
+    assert!(blas.refit(&without_place).is_none());
+    let mut collapsed = triangles.clone();
+    collapsed[9] = [Vec3::ZERO; 3];
+    assert!(Blas::build(&collapsed).refit(&triangles).is_none(), "one has come back");
+}
+
 /// Axis-parallel and diagonal rays on a grid, origins on slabs and corners: all that makes 0 · ∞.
 #[test]
 fn zero_direction_components_miss_nothing() {

@@ -14,6 +14,8 @@ pub struct Blas {
     pub(super) wide: WideBvh,
     pub(super) leaves: Leaves,
     isa: Isa,
+    /// [`Blas::cost`] when it was built, once it has been refitted.
+    pub(super) built_cost: Option<f32>,
 }
 
 impl Blas {
@@ -23,7 +25,7 @@ impl Blas {
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
         let (wide, rows) = build_triangles(triangles);
         let leaves = Leaves::new(&wide, rows);
-        Self { wide, leaves, isa: Isa::detect() }
+        Self { wide, leaves, isa: Isa::detect(), built_cost: None }
     }
 
     /// The same, traced with the given instructions.

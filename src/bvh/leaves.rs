@@ -57,12 +57,17 @@ pub(super) fn fill(part: &Part, first: usize, ids: &[u32], rows: &mut [f32], tri
     for child in part.leaves() {
         let Child::Leaf { first: start, count } = child else { continue };
         let start = start - first;
-        let leaf = &mut rows[start * 9..(start + count) * 9];
-        for (i, &id) in ids[start..start + count].iter().enumerate() {
-            for (corner, p) in triangles[id as usize].iter().enumerate() {
-                for axis in 0..3 {
-                    leaf[(corner * 3 + axis) * count + i] = p[axis];
-                }
+        fill_leaf(&ids[start..start + count], &mut rows[start * 9..(start + count) * 9], triangles);
+    }
+}
+
+/// Writes the rows of one leaf.
+#[inline]
+pub(super) fn fill_leaf(ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) {
+    for (i, &id) in ids.iter().enumerate() {
+        for (corner, p) in triangles[id as usize].iter().enumerate() {
+            for axis in 0..3 {
+                rows[(corner * 3 + axis) * ids.len() + i] = p[axis];
             }
         }
     }
@@ -72,6 +77,11 @@ impl Leaves {
     /// With rows that [`fill`] has filled.
     pub fn new(wide: &WideBvh, rows: Vec<f32>) -> Self {
         Self { rows, ids: wide.prims.clone() }
+    }
+
+    /// Those of one leaf.
+    pub fn rows_of(&mut self, first: usize, count: usize) -> &mut [f32] {
+        &mut self.rows[first * 9..(first + count) * 9]
     }
 
     pub fn bytes(&self) -> usize {

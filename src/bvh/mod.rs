@@ -13,6 +13,7 @@ mod leaves;
 mod packet;
 pub mod probe;
 pub mod ray;
+mod refit;
 mod rows;
 pub mod simd;
 mod single;

@@ -91,7 +91,7 @@ impl Default for WideBvh {
 const NODE_COST: f32 = 1.0;
 
 /// Cost of testing the entries of a leaf.
-fn leaf_cost(count: u32) -> f32 {
+pub(super) fn leaf_cost(count: u32) -> f32 {
     0.9 + 0.1 * count as f32
 }
 
@@ -386,15 +386,20 @@ impl WideNode {
     }
 
     fn set_child(&mut self, slot: usize, node: &Node, child: Child) {
-        for axis in 0..3 {
-            self.bounds[axis][0][slot] = node.min[axis];
-            self.bounds[axis][1][slot] = node.max[axis];
-        }
+        self.set_bounds(slot, &Aabb { min: node.min, max: node.max });
         self.children[slot] = child.pack();
     }
 
+    /// Gives a child that is there another box.
+    pub(super) fn set_bounds(&mut self, slot: usize, bounds: &Aabb) {
+        for axis in 0..3 {
+            self.bounds[axis][0][slot] = bounds.min[axis];
+            self.bounds[axis][1][slot] = bounds.max[axis];
+        }
+    }
+
     /// Finds the orders: along the diagonal of the octant, by the boxes' middles.
-    fn sort(&mut self) {
+    pub(super) fn sort(&mut self) {
         let middles: [Vec3; WIDTH] = std::array::from_fn(|slot| {
             let bounds = self.child_bounds(slot);
             if bounds.is_empty() { Vec3::INFINITY } else { bounds.center() }

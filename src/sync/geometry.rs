@@ -13,16 +13,19 @@ use std::sync::Arc;
 #[derive(Component, Clone, Debug)]
 pub struct MeshBlas(pub Arc<Blas>);
 
-/// Builds the BLAS of each new or changed mesh.
+/// Builds the BLAS of each new mesh, and fits that of a changed one to it if it can be.
 pub fn build_blas(
     mut commands: Commands,
     mut redone: ResMut<Redone>,
-    changed: Query<(Entity, &Mesh), Changed<Mesh>>,
+    changed: Query<(Entity, &Mesh, Option<&MeshBlas>), Changed<Mesh>>,
     mut removed: RemovedComponents<Mesh>,
 ) {
-    for (entity, mesh) in &changed {
+    for (entity, mesh, old) in &changed {
         let triangles: Vec<[Vec3; 3]> = (0..mesh.0.triangles.len()).map(|i| mesh.0.corners(i)).collect();
-        commands.entity(entity).insert(MeshBlas(Arc::new(Blas::build(&triangles))));
+        let refitted = old.and_then(|MeshBlas(old)| old.refit(&triangles));
+        redone.refits += u64::from(refitted.is_some());
+        let blas = refitted.unwrap_or_else(|| Blas::build(&triangles));
+        commands.entity(entity).insert(MeshBlas(Arc::new(blas)));
         redone.blas += 1;
     }
     for entity in removed.read() {

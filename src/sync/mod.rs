@@ -2,7 +2,7 @@
 //!
 //! | changed | redone |
 //! |---|---|
-//! | a mesh | its own BLAS, then the TLAS |
+//! | a mesh | its own BLAS (refitted, where that is good enough), then the TLAS |
 //! | an instance, its transform; one added or removed | the TLAS |
 //! | a material or texture | the surface list (and the lights, for its emission) |
 //! | a light or its transform | the light list |
@@ -48,8 +48,10 @@ pub struct Instructions(pub Isa);
 /// How often each thing was redone: for the HUD and for the tests that hold the table above.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Redone {
-    /// Bottom-level hierarchies built.
+    /// Bottom-level hierarchies built or refitted.
     pub blas: u64,
+    /// Those refitted.
+    pub refits: u64,
     /// Top-level hierarchies built.
     pub tlas: u64,
     /// Surface lists made.
