@@ -116,7 +116,8 @@ fn against_reference(peers: &Path, name: &str, mode: &str, runs: u32, spp: u32) 
 
 /// The same with our picture `gain` times as bright, to see that a bias is found.
 fn against_reference_with(peers: &Path, name: &str, mode: &str, runs: u32, spp: u32, gain: f32) -> Outcome {
-    let folder = support::folder("peers");
+    // One of its own for each picture: tests run at the same time.
+    let folder = support::folder(&format!("peers/{name}.{mode}.{gain}"));
     let path = convert(peers, name, &folder);
     let reference = LinearImage::open(&peers.join(format!("refs/{name}.{mode}.exr"))).unwrap();
     let integrator = if mode == "direct" { Integrator::Direct } else { Integrator::Path };
