@@ -97,8 +97,7 @@ impl Leaves {
     /// A triangle of a leaf.
     #[inline(always)]
     fn corners(rows: &[f32], count: usize, i: usize) -> [Vec3; 3] {
-        let row = |k: usize| rows[k * count + i];
-        three(|c| Vec3::new(row(3 * c), row(3 * c + 1), row(3 * c + 2)))
+        three!(|c| Vec3::from_array(three!(|axis| rows[(3 * c + axis) * count + i])))
     }
 
     /// One ray, up to eight triangles. `offer` is told of each hit at or before `t_max`, and whether it takes
@@ -115,14 +114,13 @@ impl Leaves {
     ) -> ControlFlow<(), f32> {
         let (first, count) = leaf;
         let rows = &self.rows[first * 9..first * 9 + count * 9 + MAX_LEAF];
-        let splat = |x: f32| S::F8::splat(simd, x);
         let mut candidates = lowest(count) as u32;
         let (mut certain, mut doubtful) = (0, 0);
         let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
         if !probe.extreme {
             let shear = Shear {
-                origin: three(|i| splat(probe.sheared_origin[i])),
-                shear: three(|i| splat(probe.shear[i])),
+                origin: three!(|i| S::F8::splat(simd, probe.sheared_origin[i])),
+                shear: three!(|i| S::F8::splat(simd, probe.shear[i])),
             };
             let edges = shear.edges(S::F8::load_corners(simd, rows, count, &AXES[probe.axis]));
             candidates &= edges.inside(simd).bits();
@@ -131,7 +129,7 @@ impl Leaves {
             }
             let distance = shear.distance(simd, &edges);
             let on_edge = distance.on_edge.bits();
-            certain = distance.ahead.and(distance.t.le(splat(t_max))).bits() & !on_edge;
+            certain = distance.ahead.and(distance.t.le(S::F8::splat(simd, t_max))).bits() & !on_edge;
             doubtful = distance.doubtful.bits() & !on_edge;
             candidates &= certain | doubtful | on_edge;
             distance.t.store(&mut ts);
@@ -179,12 +177,11 @@ impl Leaves {
     ) -> u64 {
         let (first, count) = leaf;
         let rows = &self.rows[first * 9..first * 9 + count * 9];
-        let splat = |x: f32| S::F16::splat(simd, x);
-        let [x, y, z] = AXES[packet.axis];
+        let axes = AXES[packet.axis];
         let mut done = 0;
         for i in 0..count {
             let corners = Self::corners(rows, count, i);
-            let permuted = three(|c| [splat(corners[c][x]), splat(corners[c][y]), splat(corners[c][z])]);
+            let permuted = three!(|c| three!(|i| S::F16::splat(simd, corners[c][axes[i]])));
             let triangle = self.ids[first + i];
             let mut rest = rays & !done;
             while rest != 0 {

@@ -62,25 +62,29 @@ impl Packet {
         let groups = count.div_ceil(GROUP);
         (self.octant, self.axis) = (class.octant, class.axis);
         let [x, y, z] = AXES[self.axis];
-        let constant = |x: f32| S::F16::splat(simd, x);
-        let one = constant(1.0);
-        let finite = |lanes: S::F16| lanes.min(constant(f32::MAX)).max(constant(-f32::MAX));
-        let mut spans = [[[constant(f32::INFINITY), constant(f32::NEG_INFINITY)]; 3]; 3];
+        let one = S::F16::splat(simd, 1.0);
+        let (least, most) = (S::F16::splat(simd, f32::MIN), S::F16::splat(simd, f32::MAX));
+        let ulps = S::F16::splat(simd, 2.0 * f32::EPSILON);
+        let tiny = S::F16::splat(simd, f32::MIN_POSITIVE);
+        let slack = S::F16::splat(simd, SLACK * slack);
+        let mut spans =
+            [[[S::F16::splat(simd, f32::INFINITY), S::F16::splat(simd, f32::NEG_INFINITY)]; 3]; 3];
         self.extreme = 0;
         for group in 0..groups {
-            let row = |rows: &[Row; 3], axis: usize| rows[axis].get::<S::F16>(simd, group);
-            let origin: [S::F16; 3] = three(|axis| row(&self.rays.origin, axis));
-            let direction: [S::F16; 3] = three(|axis| row(&self.rays.direction, axis));
-            let reach: [S::F16; 3] = three(|axis| {
-                let below = (constant(bounds.min[axis]) - origin[axis]).abs();
-                below.max((constant(bounds.max[axis]) - origin[axis]).abs())
+            let origin: [S::F16; 3] = three!(|axis| self.rays.origin[axis].get(simd, group));
+            let direction: [S::F16; 3] = three!(|axis| self.rays.direction[axis].get(simd, group));
+            let reach: [S::F16; 3] = three!(|axis| {
+                let below = (S::F16::splat(simd, bounds.min[axis]) - origin[axis]).abs();
+                below.max((S::F16::splat(simd, bounds.max[axis]) - origin[axis]).abs())
             });
             for axis in 0..3 {
-                let step = origin[axis].abs() * constant(2.0 * f32::EPSILON) + constant(f32::MIN_POSITIVE);
-                let slack = (reach[axis] + reach[z]) * constant(SLACK * slack) + step;
+                let step = origin[axis].abs() * ulps + tiny;
+                let slack = (reach[axis] + reach[z]) * slack + step;
                 let (less, more) = (origin[axis] - slack, origin[axis] + slack);
                 let (near, far) = if self.octant >> axis & 1 == 0 { (more, less) } else { (less, more) };
-                let [near, far, inverse] = [finite(near), finite(far), finite(one / direction[axis])];
+                let near = near.min(most).max(least);
+                let far = far.min(most).max(least);
+                let inverse = (one / direction[axis]).min(most).max(least);
                 self.near_origin[axis].set(group, near);
                 self.far_origin[axis].set(group, far);
                 self.inverse[axis].set(group, inverse);
@@ -92,7 +96,8 @@ impl Packet {
             self.shear[1].set(group, direction[y] / direction[z]);
             self.shear[2].set(group, one / direction[z]);
             let farthest = reach[0].max(reach[1]).max(reach[2]);
-            let ordinary = constant(1.0 / EXTREME).le(farthest).and(farthest.lt(constant(EXTREME)));
+            let ordinary = S::F16::splat(simd, 1.0 / EXTREME).le(farthest);
+            let ordinary = ordinary.and(farthest.lt(S::F16::splat(simd, EXTREME)));
             self.extreme |= u64::from(!ordinary.bits() & 0xffff) << (group * GROUP);
         }
         for axis in 0..3 {
@@ -132,8 +137,8 @@ impl Packet {
     pub fn shear<S: Simd>(&self, simd: S, group: usize) -> Shear<S::F16> {
         let axes = AXES[self.axis];
         Shear {
-            origin: three(|i| self.rays.origin[axes[i]].get(simd, group)),
-            shear: three(|i| self.shear[i].get(simd, group)),
+            origin: three!(|i| self.rays.origin[axes[i]].get(simd, group)),
+            shear: three!(|i| self.shear[i].get(simd, group)),
         }
     }
 
@@ -147,20 +152,19 @@ impl Packet {
     /// those behind it are taken along unasked.
     #[inline(always)]
     pub fn entering<S: Simd>(&self, simd: S, node: &WideNode, slot: usize, rays: u64, ranged: bool) -> u64 {
-        let side = |axis: usize, side: usize| S::F16::splat(simd, node.bounds[axis][side][slot % WIDTH]);
-        let near = three(|axis| side(axis, self.near_side(axis)));
-        let far = three(|axis| side(axis, self.near_side(axis) ^ 1));
+        let slot = slot % WIDTH;
+        let near = three!(|axis| S::F16::splat(simd, node.bounds[axis][self.near_side(axis)][slot]));
+        let far = three!(|axis| S::F16::splat(simd, node.bounds[axis][self.near_side(axis) ^ 1][slot]));
         let zero = S::F16::splat(simd, 0.0);
         let mut entering = rays;
         let mut rest = rays;
         while rest != 0 {
             let group = rest.trailing_zeros() as usize / GROUP;
-            let row = |rows: &[Row; 3], axis: usize| rows[axis].get::<S::F16>(simd, group);
-            let inverse: [S::F16; 3] = three(|axis| row(&self.inverse, axis));
-            let enter = |axis: usize| (near[axis] - row(&self.near_origin, axis)) * inverse[axis];
-            let leave = |axis: usize| (far[axis] - row(&self.far_origin, axis)) * inverse[axis];
-            let entry = enter(0).max(enter(1)).max(enter(2).max(zero));
-            let exit = leave(0).min(leave(1)).min(leave(2).min(self.rays.t_max.get(simd, group)));
+            let inverse: [S::F16; 3] = three!(|axis| self.inverse[axis].get(simd, group));
+            let enter = three!(|axis| (near[axis] - self.near_origin[axis].get(simd, group)) * inverse[axis]);
+            let leave = three!(|axis| (far[axis] - self.far_origin[axis].get(simd, group)) * inverse[axis]);
+            let entry = enter[0].max(enter[1]).max(enter[2].max(zero));
+            let exit = leave[0].min(leave[1]).min(leave[2].min(self.rays.t_max.get(simd, group)));
             let hit = u64::from(entry.le(exit).bits()) << (group * GROUP);
             let members = lowest(GROUP) << (group * GROUP);
             entering &= hit | !members;
@@ -174,10 +178,10 @@ impl Packet {
 
     #[inline(always)]
     pub fn t_bound<S: Simd>(&self, simd: S, count: usize) -> f32 {
-        let groups = count.div_ceil(GROUP);
-        let most = (1..groups).fold(self.rays.t_max.get::<S::F16>(simd, 0), |most, group| {
-            most.max(self.rays.t_max.get(simd, group))
-        });
+        let mut most: S::F16 = self.rays.t_max.get(simd, 0);
+        for group in 1..count.div_ceil(GROUP) {
+            most = most.max(self.rays.t_max.get(simd, group));
+        }
         most.highest()
     }
 }
@@ -195,20 +199,20 @@ impl Packet {
         waiting: &mut PacketWaiting,
         count: usize,
     ) -> usize {
-        let splat = |x: f32| S::F8::splat(simd, x);
-        let side = |axis: usize, side: usize| S::F8::load(simd, &node.bounds[axis][side]);
-        let enter = |axis: usize| {
-            let p = side(axis, self.near_side(axis)) - splat(self.first[axis]);
-            let [low, high] = [splat(self.inverse_span[axis][0]), splat(self.inverse_span[axis][1])];
-            (p * low).min(p * high)
-        };
-        let leave = |axis: usize| {
-            let p = side(axis, self.near_side(axis) ^ 1) - splat(self.last[axis]);
-            let [low, high] = [splat(self.inverse_span[axis][0]), splat(self.inverse_span[axis][1])];
-            (p * low).max(p * high)
-        };
-        let entry = enter(0).max(enter(1)).max(enter(2).max(splat(0.0)));
-        let exit = leave(0).min(leave(1)).min(leave(2).min(splat(t_bound)));
+        let low = three!(|axis| S::F8::splat(simd, self.inverse_span[axis][0]));
+        let high = three!(|axis| S::F8::splat(simd, self.inverse_span[axis][1]));
+        let enter = three!(|axis| {
+            let near = S::F8::load(simd, &node.bounds[axis][self.near_side(axis)]);
+            let p = near - S::F8::splat(simd, self.first[axis]);
+            (p * low[axis]).min(p * high[axis])
+        });
+        let leave = three!(|axis| {
+            let far = S::F8::load(simd, &node.bounds[axis][self.near_side(axis) ^ 1]);
+            let p = far - S::F8::splat(simd, self.last[axis]);
+            (p * low[axis]).max(p * high[axis])
+        });
+        let entry = enter[0].max(enter[1]).max(enter[2].max(S::F8::splat(simd, 0.0)));
+        let exit = leave[0].min(leave[1]).min(leave[2].min(S::F8::splat(simd, t_bound)));
         let base = (index * WIDTH) as u32;
         let children = [base, base + 1, base + 2, base + 3, base + 4, base + 5, base + 6, base + 7];
         let to = (

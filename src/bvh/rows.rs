@@ -1,7 +1,7 @@
 //! Rays side by side, and which of them may share a packet.
 
 use super::Ray;
-use super::simd::{Lanes, Mask, Simd};
+use super::simd::{Lanes, Mask, Simd, three};
 use glam::Vec3;
 
 /// Most rays of a packet.
@@ -94,8 +94,7 @@ impl Rays {
     pub fn classes<S: Simd>(&self, simd: S, count: usize) -> Classes {
         let mut classes = Classes { rest: lowest(count), negative: [0; 3], largest: [0; 3] };
         for group in 0..count.div_ceil(GROUP) {
-            let row = |axis: usize| self.direction[axis].get::<S::F16>(simd, group);
-            let [x, y, z] = [row(0), row(1), row(2)];
+            let [x, y, z]: [S::F16; 3] = three!(|axis| self.direction[axis].get(simd, group));
             let shift = group * GROUP;
             for (negative, row) in classes.negative.iter_mut().zip([x, y, z]) {
                 *negative |= u64::from(row.signs()) << shift;

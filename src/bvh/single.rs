@@ -92,14 +92,13 @@ pub(super) struct Boxes<S: Simd> {
 impl<S: Simd> Boxes<S> {
     #[inline(always)]
     pub fn new(simd: S, probe: &Probe) -> Self {
-        let splat = |v: glam::Vec3| three(|axis| S::F8::splat(simd, v[axis]));
         let octant = probe.octant();
         Self {
             simd,
-            near_origin: splat(probe.near_origin),
-            far_origin: splat(probe.far_origin),
-            inverse: splat(probe.inverse),
-            near_side: three(|axis| octant >> axis & 1),
+            near_origin: three!(|axis| S::F8::splat(simd, probe.near_origin[axis])),
+            far_origin: three!(|axis| S::F8::splat(simd, probe.far_origin[axis])),
+            inverse: three!(|axis| S::F8::splat(simd, probe.inverse[axis])),
+            near_side: three!(|axis| octant >> axis & 1),
             octant,
         }
     }

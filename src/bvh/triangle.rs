@@ -86,7 +86,7 @@ impl<V: Lanes> Shear<V> {
     #[inline(always)]
     pub fn distance(&self, proof: V::Proof, edges: &Edges<V>) -> Distance<V> {
         let [u, v, w] = edges.weights;
-        let [a, b, c] = three(|i| self.shear[2] * edges.depths[i]);
+        let [a, b, c] = three!(|i| self.shear[2] * edges.depths[i]);
         let zero = V::splat(proof, 0.0);
         let determinant = u + v + w;
         let t = (u * a + v * b + w * c) / determinant;
@@ -97,8 +97,8 @@ impl<V: Lanes> Shear<V> {
         let inverse_determinant = V::splat(proof, 1.0) / determinant;
         let near = t.le(cancels).and(surely_behind.le(t));
         let [a, b, c] = edges.offsets;
-        let extent = |i: usize| a[i].abs().max(b[i].abs()).max(c[i].abs());
-        let least = extent(0) * extent(1) * V::splat(proof, THIN);
+        let [x, y, _] = three!(|i| a[i % 2].abs().max(b[i % 2].abs()).max(c[i % 2].abs()));
+        let least = x * y * V::splat(proof, THIN);
         let area = determinant.abs();
         let ahead = cancels.lt(t).and(least.le(area));
         Distance { t, inverse_determinant, ahead, doubtful: near.or(area.lt(least)), on_edge }

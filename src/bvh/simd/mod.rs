@@ -23,6 +23,31 @@ pub use portable::{Narrow, One, Plain};
 
 use std::ops::{Add, Div, Mul, Sub};
 
+/// `three!(|i| f(i))` is `[f(0), f(1), f(2)]`.
+///
+/// No closure: the compiler need not inline one that is called more than once, and what it does not inline
+/// it compiles for the oldest machine, where every vector operation is then a call. So kernels have no
+/// closures with vectors in them; `.ci/run` sees to it.
+macro_rules! three {
+    (|$i:ident| $value:expr) => {
+        [
+            {
+                let $i = 0_usize;
+                $value
+            },
+            {
+                let $i = 1_usize;
+                $value
+            },
+            {
+                let $i = 2_usize;
+                $value
+            },
+        ]
+    };
+}
+pub(super) use three;
+
 /// An instruction set: its vector types, and (as a value) the proof that the machine has it.
 pub trait Simd: Copy {
     /// Eight floats.
@@ -65,13 +90,11 @@ pub trait Lanes:
     #[inline(always)]
     fn load_corners(proof: Self::Proof, rows: &[f32], stride: usize, axes: &[usize; 3]) -> [[Self; 3]; 3] {
         assert!(rows.len() >= 8 * stride + Self::N);
-        three(|corner| {
-            three(|i| {
-                let start = (3 * corner + axes[i] % 3) * stride;
-                // SAFETY: at most 8 strides are in front of it, so that `N` floats are left, as asserted.
-                Self::load(proof, unsafe { rows.get_unchecked(start..start + Self::N) })
-            })
-        })
+        three!(|corner| three!(|i| {
+            let start = (3 * corner + axes[i] % 3) * stride;
+            // SAFETY: at most 8 strides are in front of it, so that `N` floats are left, as asserted.
+            Self::load(proof, unsafe { rows.get_unchecked(start..start + Self::N) })
+        }))
     }
     /// Into the first of `to`, which must be at least as many.
     fn store(self, to: &mut [f32]);
@@ -120,10 +143,4 @@ pub trait Octet: Lanes {
         nears: &mut [f32; 8],
         waiting: &mut [u32; 8],
     ) -> usize;
-}
-
-/// `[f(0), f(1), f(2)]`; unlike `std::array::from_fn` surely compiled for its caller's instructions.
-#[inline(always)]
-pub fn three<T>(f: impl Fn(usize) -> T) -> [T; 3] {
-    [f(0), f(1), f(2)]
 }
