@@ -20,7 +20,7 @@ const MAX_PARTS: f64 = 4096.0;
 
 /// More references than triangles: a quarter, but small scenes may have this many in any case.
 fn budget(triangles: usize) -> usize {
-    (triangles / 4).max((64 * triangles).min(150_000))
+    (triangles / 4).max((64 * triangles).min(40_000))
 }
 
 /// Replaces references to whole triangles by several to parts, where that pays.
