@@ -7,7 +7,7 @@ use crate::scene::propagate_transforms;
 use crate::sync::{self, Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
-    Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
+    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
 };
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
@@ -103,6 +103,7 @@ impl App {
         world.init_resource::<Geometry>();
         world.init_resource::<Surfaces>();
         world.init_resource::<Lights>();
+        world.init_resource::<Coverage>();
         world.init_resource::<Viewpoint>();
         world.init_resource::<RenderOrigin>();
         world.init_resource::<Instructions>();
@@ -139,6 +140,7 @@ impl App {
         let scene = TraceScene {
             geometry: self.world.resource::<Geometry>(),
             surfaces: self.world.resource::<Surfaces>(),
+            coverage: self.world.resource::<Coverage>(),
             lights: self.world.resource::<Lights>(),
             viewpoint: self.world.resource::<Viewpoint>(),
             settings: self.world.resource::<RenderSettings>(),
@@ -184,6 +186,7 @@ fn frame_schedule() -> Schedule {
             sync::sync_surfaces,
             sync::sync_geometry,
             sync::sync_lights,
+            sync::sync_coverage,
             sync::sync_viewpoint,
             sync::reset_film,
         )
@@ -200,6 +203,7 @@ fn frame_schedule() -> Schedule {
 pub fn trace_frame(
     geometry: Res<Geometry>,
     surfaces: Res<Surfaces>,
+    coverage: Res<Coverage>,
     lights: Res<Lights>,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
@@ -213,6 +217,7 @@ pub fn trace_frame(
     let scene = TraceScene {
         geometry: &geometry,
         surfaces: &surfaces,
+        coverage: &coverage,
         lights: &lights,
         viewpoint: &viewpoint,
         settings: &settings,

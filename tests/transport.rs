@@ -15,7 +15,9 @@ use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::light::FlatLight;
 use penumbra::trace::scene::InstanceData;
 use penumbra::trace::surface::Interaction;
-use penumbra::trace::{Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use penumbra::trace::{
+    Coverage, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint,
+};
 use stage::{Estimate, Rng, Stage, ball, cube, quad, reds, settings};
 use std::sync::Arc;
 
@@ -277,6 +279,7 @@ fn a_closed_room_is_exactly_dark_whatever_shines_outside() {
 struct Alone {
     geometry: Geometry,
     surfaces: Surfaces,
+    coverage: Coverage,
     lights: Lights,
     viewpoint: Viewpoint,
     settings: RenderSettings,
@@ -291,6 +294,7 @@ impl Alone {
         Some(Self {
             geometry: Geometry { tlas: Tlas::build(vec![placement]), instances: vec![data] },
             surfaces: Surfaces::default(),
+            coverage: Coverage::default(),
             lights: Lights::default(),
             viewpoint: Viewpoint::default(),
             settings: RenderSettings::default(),
@@ -298,8 +302,8 @@ impl Alone {
     }
 
     fn scene(&self) -> TraceScene<'_> {
-        let Self { geometry, surfaces, lights, viewpoint, settings } = self;
-        TraceScene { geometry, surfaces, lights, viewpoint, settings }
+        let Self { geometry, surfaces, coverage, lights, viewpoint, settings } = self;
+        TraceScene { geometry, surfaces, coverage, lights, viewpoint, settings }
     }
 
     fn at(&self, hit: &Hit, ray: &Ray) -> Interaction {

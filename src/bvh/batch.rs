@@ -67,6 +67,16 @@ impl Scratch {
     }
 }
 
+impl Scratch {
+    /// What was learned of the last batch's scene.
+    fn forget(&mut self) {
+        self.waiting.blocker = None;
+        if let Some(inner) = &mut self.inner {
+            inner.forget();
+        }
+    }
+}
+
 /// The triangles of one instance, asked for by a packet.
 pub(super) struct Triangles<'a, F, const ANY: bool> {
     pub blas: &'a Blas,
@@ -80,10 +90,12 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Triangles<'_, F, ANY> {
     #[inline(always)]
     fn many(&mut self, simd: S, packet: &mut Packet, first: usize, count: usize, rays: u64) -> u64 {
         let (filter, numbers) = (self.filter, self.numbers);
+        let all = F::ALL || !filter.asks(self.instance);
         let takes = |lane: usize, hit: &Hit| filter.takes(numbers[lane % PACKET], hit);
+        let takes = (!all).then_some(takes);
         let leaves = &self.blas.leaves;
         let leaf = (first, count);
-        leaves.test_many::<S, F, ANY>(simd, packet, leaf, self.instance, rays, self.found, takes)
+        leaves.test_many::<S, ANY>(simd, packet, leaf, self.instance, rays, self.found, takes)
     }
 
     #[inline(always)]
@@ -98,8 +110,9 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Triangles<'_, F, ANY> {
     ) -> ControlFlow<(), f32> {
         let t_max = packet.rays.t_max.0[lane % PACKET];
         let number = self.numbers[lane % PACKET];
+        let all = F::ALL || !self.filter.asks(self.instance);
         self.blas.leaves.test_one::<S, ANY>(simd, probe, (first, count), self.instance, t_max, |hit| {
-            self.found.offer(packet, lane, hit, |hit| self.filter.takes(number, hit))
+            self.found.offer(packet, lane, hit, |hit| all || self.filter.takes(number, hit))
         })
     }
 }
@@ -134,6 +147,7 @@ where
         let mut alone: Vec<usize> = Vec::new();
         let (bounds, slack) = target.bounds();
         let mut scratch = SCRATCH.take().unwrap_or_else(Scratch::new);
+        scratch.forget();
         let mut loaded = Rays::blank();
         for start in (0..count).step_by(PACKET) {
             let members = PACKET.min(count - start);

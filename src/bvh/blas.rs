@@ -147,6 +147,6 @@ impl Target for Blas {
     ) -> u64 {
         let Scratch { packet, found, waiting, numbers, .. } = scratch;
         let mut visitor = Triangles::<F, ANY> { blas: self, instance: 0, found, numbers, filter };
-        self.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor)
+        self.wide.traverse_packet::<S, ANY>(simd, packet, rays, waiting, &mut visitor)
     }
 }

@@ -20,10 +20,20 @@ pub(super) struct Leaves {
     ids: Vec<u32>,
 }
 
+/// Decides which hits count.
+pub trait Accept {
+    /// Whether hits in this instance have to be asked about: those of others all count, at no cost.
+    fn asks(&self, instance: u32) -> bool;
+    /// Whether a hit of ray number `ray` counts.
+    fn takes(&self, ray: usize, hit: &Hit) -> bool;
+}
+
 /// Which hits count.
 pub(super) trait Filter: Copy {
     /// All do: nothing needs to be asked.
     const ALL: bool;
+    /// Whether hits in this instance have to be asked about at all.
+    fn asks(&self, instance: u32) -> bool;
     /// Whether a hit of ray number `ray` counts.
     fn takes(&self, ray: usize, hit: &Hit) -> bool;
 }
@@ -35,20 +45,35 @@ pub(super) struct All;
 impl Filter for All {
     const ALL: bool = true;
     #[inline(always)]
+    fn asks(&self, _: u32) -> bool {
+        false
+    }
+    #[inline(always)]
     fn takes(&self, _: usize, _: &Hit) -> bool {
         true
     }
 }
 
-/// Those that a function takes.
-#[derive(Clone, Copy)]
-pub(super) struct Only<F>(pub F);
+/// Those that somebody takes.
+pub(super) struct Only<'a, A>(pub &'a A);
 
-impl<F: Fn(usize, &Hit) -> bool + Copy> Filter for Only<F> {
+impl<A> Clone for Only<'_, A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A> Copy for Only<'_, A> {}
+
+impl<A: Accept> Filter for Only<'_, A> {
     const ALL: bool = false;
     #[inline(always)]
+    fn asks(&self, instance: u32) -> bool {
+        self.0.asks(instance)
+    }
+    #[inline(always)]
     fn takes(&self, ray: usize, hit: &Hit) -> bool {
-        (self.0)(ray, hit)
+        self.0.takes(ray, hit)
     }
 }
 
@@ -162,10 +187,9 @@ impl Leaves {
     }
 
     /// Rays of a packet, the triangles of a leaf one after the other. `takes` is asked about lanes' hits
-    /// unless `F` takes all. Returns the rays that need no more,
-    /// which are those with a hit if `ANY` will do.
+    /// if given; otherwise all count. Returns the rays that need no more, which are those with a hit if `ANY` will do.
     #[inline(always)]
-    pub fn test_many<S: Simd, F: Filter, const ANY: bool>(
+    pub fn test_many<S: Simd, const ANY: bool>(
         &self,
         simd: S,
         packet: &mut Packet,
@@ -173,7 +197,7 @@ impl Leaves {
         instance: u32,
         rays: u64,
         found: &mut Found,
-        takes: impl Fn(usize, &Hit) -> bool,
+        takes: Option<impl Fn(usize, &Hit) -> bool>,
     ) -> u64 {
         let (first, count) = leaf;
         let rows = &self.rows[first * 9..first * 9 + count * 9];
@@ -208,9 +232,9 @@ impl Leaves {
                     let t = distance.t;
                     let closer = certain & t.lt(t_max).bits();
                     let equal = certain & t.eq(t_max).bits();
-                    if ANY && F::ALL {
+                    if ANY && takes.is_none() {
                         done |= u64::from(closer | equal) << base;
-                    } else if F::ALL {
+                    } else if takes.is_none() {
                         found.keep::<S>(simd, packet, group, closer, [t, u, v], triangle, instance);
                         one_by_one |= equal;
                     } else {
@@ -238,7 +262,10 @@ impl Leaves {
                     };
                     let Some(TriangleHit { t, u, v }) = hit else { continue };
                     let hit = Hit { t, u, v, triangle, instance };
-                    if found.offer(packet, lane, hit, |hit| takes(lane, hit)) && ANY {
+                    if found
+                        .offer(packet, lane, hit, |hit| takes.as_ref().is_none_or(|takes| takes(lane, hit)))
+                        && ANY
+                    {
                         done |= 1 << lane;
                     }
                 }

@@ -27,6 +27,7 @@ pub mod wide;
 pub use aabb::Aabb;
 pub use blas::Blas;
 pub use build::{Bvh, Defect, Node};
+pub use leaves::Accept;
 pub use probe::Probe;
 pub use ray::{Hit, Ray};
 pub use simd::Isa;

@@ -2,7 +2,7 @@
 
 use super::batch::{Batch, Scratch, Target, Triangles};
 use super::found::Found;
-use super::leaves::{All, Filter, Only};
+use super::leaves::{Accept, All, Filter, Only};
 use super::packet::Packet;
 use super::rows::{PACKET, Rays, each, lowest};
 use super::simd::{Isa, Simd};
@@ -163,12 +163,7 @@ impl Tlas {
     ///
     /// # Panics
     /// Unless there are as many `hits` as `rays`.
-    pub fn closest_hits(
-        &self,
-        rays: &[Ray],
-        hits: &mut [Option<Hit>],
-        accept: Option<&(impl Fn(usize, &Hit) -> bool + Sync)>,
-    ) {
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>], accept: Option<&impl Accept>) {
         assert_eq!(rays.len(), hits.len());
         let report = |i: usize, hit| hits[i] = hit;
         match accept {
@@ -182,12 +177,7 @@ impl Tlas {
     ///
     /// # Panics
     /// Unless there are as many `blocked` as `rays`.
-    pub fn any_hits(
-        &self,
-        rays: &[Ray],
-        blocked: &mut [bool],
-        accept: Option<&(impl Fn(usize, &Hit) -> bool + Sync)>,
-    ) {
+    pub fn any_hits(&self, rays: &[Ray], blocked: &mut [bool], accept: Option<&impl Accept>) {
         assert_eq!(rays.len(), blocked.len());
         let report = |i: usize, hit: Option<Hit>| blocked[i] = hit.is_some();
         match accept {
@@ -250,7 +240,7 @@ impl Target for Tlas {
         let Scratch { packet, found, waiting, numbers, inner } = scratch;
         let inner = inner.get_or_insert_with(Scratch::new);
         let mut visitor = Instances::<F, ANY> { tlas: self, found, numbers, filter, inner };
-        self.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor)
+        self.wide.traverse_packet::<S, false>(simd, packet, rays, waiting, &mut visitor)
     }
 }
 
@@ -273,7 +263,7 @@ impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
         if placement.identity {
             let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
-            return blas.wide.traverse_packet(simd, packet, rays, waiting, &mut visitor);
+            return blas.wide.traverse_packet::<S, ANY>(simd, packet, rays, waiting, &mut visitor);
         }
         let mut moved = Rays::blank();
         let mut lanes = [0; PACKET];
@@ -293,7 +283,7 @@ impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
                 found.copy(i, self.found, lane);
             }
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter: self.filter };
-            let ended = blas.wide.traverse_packet(
+            let ended = blas.wide.traverse_packet::<S, ANY>(
                 simd,
                 local,
                 lowest(members.count_ones() as usize),

@@ -29,6 +29,15 @@ pub(super) trait Visitor<S: Simd> {
     ) -> ControlFlow<(), f32>;
 }
 
+/// A leaf that blocked a ray: it may well block those of the next packet too, which is asked first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Blocker {
+    /// Address of its hierarchy, good within one batch.
+    hierarchy: usize,
+    first: usize,
+    count: usize,
+}
+
 /// Children that a packet has yet to visit.
 #[derive(Debug)]
 pub(super) struct PacketWaiting {
@@ -38,6 +47,8 @@ pub(super) struct PacketWaiting {
     /// The rays that entered the node.
     pub rays: [u64; MAX_WAITING],
     pub single: Waiting,
+    /// The leaf that blocked a ray last.
+    pub blocker: Option<Blocker>,
 }
 
 impl Default for PacketWaiting {
@@ -47,6 +58,7 @@ impl Default for PacketWaiting {
             children: [0; MAX_WAITING],
             rays: [0; MAX_WAITING],
             single: Waiting::default(),
+            blocker: None,
         }
     }
 }
@@ -55,7 +67,7 @@ impl WideBvh {
     /// Takes the `rays` of the packet through all leaves that any of them enters; returns those of which
     /// the visitor said that they need no more.
     #[inline(always)]
-    pub(super) fn traverse_packet<S: Simd>(
+    pub(super) fn traverse_packet<S: Simd, const ANY: bool>(
         &self,
         simd: S,
         packet: &mut Packet,
@@ -68,6 +80,17 @@ impl WideBvh {
         }
         let lanes = 64 - rays.leading_zeros() as usize;
         let mut alive = rays;
+        let hierarchy = std::ptr::from_ref(self).addr();
+        if ANY && let Some(last) = waiting.blocker.filter(|last| last.hierarchy == hierarchy) {
+            let done = visitor.many(simd, packet, last.first, last.count, rays);
+            alive &= !done;
+            if alive == 0 {
+                return rays;
+            }
+            if done == 0 {
+                waiting.blocker = None;
+            }
+        }
         let mut t_bound = packet.t_bound(simd, lanes);
         let mut count = 0;
         let mut node = 0;
@@ -101,10 +124,14 @@ impl WideBvh {
                         (node, entered) = (child, rays);
                         break;
                     }
-                    Child::Leaf { first, count } => {
+                    Child::Leaf { first, count: entries } => {
                         let rays = packet.entering(simd, parent, slot, rays, false);
                         if rays != 0 {
-                            alive &= !visitor.many(simd, packet, first, count, rays);
+                            let done = visitor.many(simd, packet, first, entries, rays);
+                            if ANY && done != 0 {
+                                waiting.blocker = Some(Blocker { hierarchy, first, count: entries });
+                            }
+                            alive &= !done;
                             t_bound = packet.t_bound(simd, lanes);
                         }
                     }

@@ -159,9 +159,11 @@ impl<'a, S: Simd> Walker<'a, S> {
             (Child::Leaf { first, count }, Some((blas, instance))) => {
                 let (best, number) = (&mut self.best, self.number);
                 let leaf = (first, count);
+                let all = F::ALL || !filter.asks(instance);
                 let end =
                     blas.leaves.test_one::<S, ANY>(simd, &self.probe, leaf, instance, self.t_max, |hit| {
-                        let better = best.is_none_or(|known| hit.beats(&known)) && filter.takes(number, &hit);
+                        let better =
+                            best.is_none_or(|known| hit.beats(&known)) && (all || filter.takes(number, &hit));
                         if better {
                             *best = Some(hit);
                         }

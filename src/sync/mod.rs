@@ -16,7 +16,7 @@ mod surfaces;
 
 pub use geometry::{MeshBlas, build_blas, choose_origin, sync_geometry};
 pub use lights::sync_lights;
-pub use surfaces::{MaterialNumbers, sync_surfaces};
+pub use surfaces::{MaterialNumbers, sync_coverage, sync_surfaces};
 
 use crate::bvh::Isa;
 use crate::scene::{ActiveCamera, Camera, GlobalTransform};

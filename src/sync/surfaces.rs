@@ -2,8 +2,8 @@
 
 use super::Redone;
 use crate::scene::{Alpha, Encoding, Filter, Glossy, Material, Texels, Texture, TextureUse, Wrap};
-use crate::trace::Surfaces;
-use crate::trace::scene::{Surface, TextureIndex};
+use crate::trace::scene::{Coverage, Surface, TextureIndex};
+use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -61,13 +61,30 @@ pub fn sync_surfaces(
     for (entity, texture) in &textures {
         images[texture_numbers[&entity] as usize] = Some(texture.clone());
     }
-    *surfaces = Surfaces {
-        has_alpha: materials.iter().any(|(_, m)| m.alpha != Alpha::Opaque),
-        materials: list,
-        textures: images.into_iter().map(|t| t.unwrap_or_else(white)).collect(),
-    };
+    *surfaces =
+        Surfaces { materials: list, textures: images.into_iter().map(|t| t.unwrap_or_else(white)).collect() };
     material_numbers.set_if_neq(MaterialNumbers(numbers));
     redone.surfaces += 1;
+}
+
+/// Says of which instances rays have to ask whether a hit counts.
+pub fn sync_coverage(
+    mut coverage: ResMut<Coverage>,
+    geometry: Res<Geometry>,
+    surfaces: Res<Surfaces>,
+    lights: Res<Lights>,
+) {
+    if !(geometry.is_changed() || surfaces.is_changed() || lights.is_changed()) {
+        return;
+    }
+    let is_opaque =
+        |&m: &u32| surfaces.materials.get(m as usize).is_none_or(|s| s.material.alpha == Alpha::Opaque);
+    let alpha = geometry.instances.iter().map(|data| !data.materials.iter().all(is_opaque)).collect();
+    let mut lit = vec![false; geometry.instances.len()];
+    for instance in lights.instances() {
+        lit[instance as usize] = true;
+    }
+    coverage.set_if_neq(Coverage { alpha, lights: lit });
 }
 
 fn white() -> Texture {

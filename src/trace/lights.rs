@@ -196,6 +196,11 @@ impl Lights {
         self.beyond.iter().map(|&i| (i, self.get(i)))
     }
 
+    /// Instances that are lights; some several times.
+    pub fn instances(&self) -> impl Iterator<Item = u32> {
+        self.meshes.iter().map(|((instance, _), _)| *instance)
+    }
+
     /// The light that the triangles of this slot of this instance are.
     #[must_use]
     pub fn of_mesh(&self, instance: u32, slot: u16) -> Option<u32> {

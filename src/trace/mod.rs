@@ -24,5 +24,5 @@ pub use camera::Viewpoint;
 pub use film::Film;
 pub use lights::Lights;
 pub use pass::{RayCounts, trace_pass};
-pub use scene::{Geometry, Surfaces, TraceScene};
+pub use scene::{Coverage, Geometry, Surfaces, TraceScene};
 pub use settings::{Integrator, RenderSettings};

@@ -3,7 +3,7 @@
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
-use crate::bvh::{Hit, Ray, Tlas};
+use crate::bvh::{Accept, Hit, Ray, Tlas};
 use crate::scene::{Alpha, Material, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
@@ -36,14 +36,21 @@ pub struct Surfaces {
     pub materials: Vec<Surface>,
     /// All textures.
     pub textures: Vec<Texture>,
-    /// Some material is not opaque, so hits have to be asked whether they are there.
-    pub has_alpha: bool,
 }
 
 impl Default for Surfaces {
     fn default() -> Self {
-        Self { materials: vec![Surface::from(Material::default())], textures: Vec::new(), has_alpha: false }
+        Self { materials: vec![Surface::from(Material::default())], textures: Vec::new() }
     }
+}
+
+/// Where rays have to ask whether a hit counts: the rest of the scene pays nothing for it.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
+pub struct Coverage {
+    /// By instance: whether some of its material lets rays through by chance or by a mask.
+    pub alpha: Vec<bool>,
+    /// By instance: whether it has triangles that are sampled as lights, and are no occluders of themselves.
+    pub lights: Vec<bool>,
 }
 
 /// A [`Material`] with its textures resolved to indices.
@@ -81,6 +88,8 @@ pub struct TraceScene<'a> {
     pub geometry: &'a Geometry,
     /// What it is made of.
     pub surfaces: &'a Surfaces,
+    /// Where hits have to be asked about.
+    pub coverage: &'a Coverage,
     /// What shines.
     pub lights: &'a Lights,
     /// From where it is seen.
@@ -117,8 +126,9 @@ impl<'a> TraceScene<'a> {
         hits: &mut [Option<Hit>],
         random: impl Fn(usize, u32) -> f32 + Sync,
     ) {
-        let covers = |ray: usize, hit: &Hit| self.covers(hit, |key| random(ray, key));
-        self.geometry.tlas.closest_hits(rays, hits, self.surfaces.has_alpha.then_some(&covers));
+        let covering = Covering { scene: self, ignored: &[], random };
+        let asked = self.coverage.alpha.contains(&true);
+        self.geometry.tlas.closest_hits(rays, hits, asked.then_some(&covering));
     }
 
     /// For each ray whether something is there, not counting the triangle `ignored` of it, (instance,
@@ -130,11 +140,9 @@ impl<'a> TraceScene<'a> {
         ignored: &[Option<(u32, u32)>],
         random: impl Fn(usize, u32) -> f32 + Sync,
     ) {
-        let counts = |ray: usize, hit: &Hit| {
-            ignored[ray] != Some((hit.instance, hit.triangle)) && self.covers(hit, |key| random(ray, key))
-        };
-        let asked = self.surfaces.has_alpha || ignored.iter().any(Option::is_some);
-        self.geometry.tlas.any_hits(rays, blocked, asked.then_some(&counts));
+        let asked = self.coverage.alpha.contains(&true) || ignored.iter().any(Option::is_some);
+        let covering = Covering { scene: self, ignored, random };
+        self.geometry.tlas.any_hits(rays, blocked, asked.then_some(&covering));
     }
 
     fn covers(&self, hit: &Hit, random: impl Fn(u32) -> f32) -> bool {
@@ -151,6 +159,27 @@ impl<'a> TraceScene<'a> {
             Alpha::Mask(cutoff) => alpha(()) >= cutoff,
             Alpha::Blend => random(hit.instance.wrapping_mul(0x9e37_79b9) ^ hit.triangle) < alpha(()),
         }
+    }
+}
+
+/// Says of hits whether they are there, for a batch of rays.
+struct Covering<'a, 's, R> {
+    scene: &'a TraceScene<'s>,
+    /// For each ray a triangle that doesn't count; or empty.
+    ignored: &'a [Option<(u32, u32)>],
+    random: R,
+}
+
+impl<R: Fn(usize, u32) -> f32> Accept for Covering<'_, '_, R> {
+    #[inline]
+    fn asks(&self, instance: u32) -> bool {
+        let set = |flags: &[bool]| flags.get(instance as usize).copied().unwrap_or(false);
+        set(&self.scene.coverage.alpha) || !self.ignored.is_empty() && set(&self.scene.coverage.lights)
+    }
+
+    fn takes(&self, ray: usize, hit: &Hit) -> bool {
+        self.ignored.get(ray).copied().flatten() != Some((hit.instance, hit.triangle))
+            && self.scene.covers(hit, |key| (self.random)(ray, key))
     }
 }
 

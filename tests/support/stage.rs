@@ -6,7 +6,9 @@ use bevy_ecs::prelude::*;
 use glam::{DAffine3, DQuat, DVec3, UVec2, Vec2, Vec3};
 use penumbra::app::{App, FrameBudget, FrameStats};
 use penumbra::scene::{ActiveCamera, Camera, Instance, Material, Mesh, Projection, Transform, TriangleMesh};
-use penumbra::trace::{Film, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use penumbra::trace::{
+    Coverage, Film, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint,
+};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -129,6 +131,7 @@ impl Stage {
         TraceScene {
             geometry: world.resource::<Geometry>(),
             surfaces: world.resource::<Surfaces>(),
+            coverage: world.resource::<Coverage>(),
             lights: world.resource::<Lights>(),
             viewpoint: world.resource::<Viewpoint>(),
             settings: world.resource::<RenderSettings>(),
