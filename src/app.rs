@@ -4,7 +4,7 @@ use crate::image::develop::{Display, Picture, develop};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::propagate_transforms;
-use crate::sync::{self, Instructions, MaterialNumbers, Redone, RenderOrigin};
+use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
     Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
@@ -108,6 +108,7 @@ impl App {
         world.init_resource::<RenderOrigin>();
         world.init_resource::<Instructions>();
         world.init_resource::<MaterialNumbers>();
+        world.init_resource::<BlasCache>();
         world.init_resource::<Redone>();
         world.add_schedule(frame_schedule());
         Self { world }

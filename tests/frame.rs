@@ -141,6 +141,32 @@ fn a_changed_mesh_rebuilds_its_own_hierarchy_only() {
     assert_eq!(redone, Redone { blas: 1, refits: redone.refits, tlas: 1, surfaces: 0, lights: 1, resets: 1 });
 }
 
+/// What reloading a file that did not change comes to.
+#[test]
+fn the_same_triangles_are_not_built_over_again() {
+    let redone = Stage::settled().redone_by(|s| {
+        let (instance, mesh) = (s.floor, s.floor_mesh);
+        let again = s.app.world.get::<Mesh>(mesh).unwrap().0.as_ref().clone();
+        s.app.world.despawn(mesh);
+        let again = s.app.world.spawn(Mesh(Arc::new(again))).id();
+        s.get_mut::<Instance>(instance).mesh = again;
+    });
+    assert_eq!(redone, Redone { tlas: 1, lights: 1, resets: 1, ..NOTHING });
+    let redone = Stage::settled().redone_by(|s| {
+        let (instance, mesh) = (s.floor, s.floor_mesh);
+        let mut other = s.app.world.get::<Mesh>(mesh).unwrap().0.as_ref().clone();
+        other.positions[0].x += 1e-3;
+        s.app.world.despawn(mesh);
+        let other = s.app.world.spawn(Mesh(Arc::new(other))).id();
+        s.get_mut::<Instance>(instance).mesh = other;
+    });
+    assert_eq!(
+        redone,
+        Redone { blas: 1, tlas: 1, lights: 1, resets: 1, ..NOTHING },
+        "one corner is elsewhere"
+    );
+}
+
 #[test]
 fn a_moved_mesh_keeps_the_structure_of_its_hierarchy() {
     let redone = Stage::settled().redone_by(|s| {

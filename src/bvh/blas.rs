@@ -1,7 +1,7 @@
 //! Bottom level: the triangles of one mesh.
 
 use super::batch::{Batch, Scratch, Target, Triangles};
-use super::build::build_triangles;
+use super::build::{build_triangles, has_surface};
 use super::leaves::{All, Filter, Leaves};
 use super::simd::{Isa, Simd};
 use super::wide::{WideBvh, WideNode};
@@ -38,6 +38,20 @@ impl Blas {
     #[must_use]
     pub fn hierarchy(&self) -> &WideBvh {
         &self.wide
+    }
+
+    /// Whether it is what [`Blas::build`] would make of `triangles`, or hits the same in any case.
+    #[must_use]
+    pub fn is_over(&self, triangles: &[[Vec3; 3]]) -> bool {
+        let mut there = vec![false; triangles.len()];
+        self.wide.nodes.iter().flat_map(WideNode::leaves).all(|(first, count)| {
+            for &id in &self.wide.prims[first..first + count] {
+                if let Some(there) = there.get_mut(id as usize) {
+                    *there = true;
+                }
+            }
+            self.leaves.same(first, count, triangles)
+        }) && triangles.iter().zip(there).all(|(corners, there)| there || !has_surface(corners))
     }
 
     /// The box around all triangles; empty without any.

@@ -6,7 +6,7 @@ use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit, within};
-use super::wide::{Child, MAX_LEAF, Part, WideBvh};
+use super::wide::{MAX_LEAF, Part, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
 use std::ops::ControlFlow;
@@ -79,8 +79,7 @@ impl<A: Accept> Filter for Only<'_, A> {
 
 /// Writes the rows of a part of the leaves: those of the entries from `first` on, whose triangles are `ids`.
 pub(super) fn fill(part: &Part, first: usize, ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) {
-    for child in part.leaves() {
-        let Child::Leaf { first: start, count } = child else { continue };
+    for (start, count) in part.leaves() {
         let start = start - first;
         fill_leaf(&ids[start..start + count], &mut rows[start * 9..(start + count) * 9], triangles);
     }
@@ -107,6 +106,16 @@ impl Leaves {
     /// Those of one leaf.
     pub fn rows_of(&mut self, first: usize, count: usize) -> &mut [f32] {
         &mut self.rows[first * 9..(first + count) * 9]
+    }
+
+    /// Whether the triangles of a leaf are what `triangles` has in their places, to the bit.
+    pub fn same(&self, first: usize, count: usize, triangles: &[[Vec3; 3]]) -> bool {
+        let rows = &self.rows[first * 9..(first + count) * 9];
+        let bits = |corners: &[Vec3; 3]| corners.map(|p| p.to_array().map(f32::to_bits));
+        (0..count).all(|i| {
+            let here = Self::corners(rows, count, i);
+            triangles.get(self.ids[first + i] as usize).is_some_and(|there| bits(there) == bits(&here))
+        })
     }
 
     pub fn bytes(&self) -> usize {

@@ -135,13 +135,12 @@ impl Part {
     }
 
     /// All leaves.
-    pub fn leaves(&self) -> impl Iterator<Item = Child> {
-        let alone = matches!(self.child, Child::Leaf { .. }).then_some(self.child);
-        let below = self.nodes.iter().flat_map(|node| {
-            let there = (0..WIDTH).filter(|&slot| !node.child_bounds(slot).is_empty());
-            there.map(|slot| Child::unpack(node.children[slot]))
-        });
-        alone.into_iter().chain(below).filter(|child| matches!(child, Child::Leaf { .. }))
+    pub fn leaves(&self) -> impl Iterator<Item = (usize, usize)> {
+        let alone = match self.child {
+            Child::Leaf { first, count } => Some((first, count)),
+            Child::Node(_) => None,
+        };
+        alone.into_iter().chain(self.nodes.iter().flat_map(WideNode::leaves))
     }
 }
 
@@ -383,6 +382,15 @@ impl WideNode {
             min: Vec3::new(b[0][0][slot], b[1][0][slot], b[2][0][slot]),
             max: Vec3::new(b[0][1][slot], b[1][1][slot], b[2][1][slot]),
         }
+    }
+
+    /// The leaves among its children: first entry and number of entries of each.
+    pub fn leaves(&self) -> impl Iterator<Item = (usize, usize)> {
+        let there = (0..WIDTH).filter(|&slot| !self.child_bounds(slot).is_empty());
+        there.filter_map(|slot| match Child::unpack(self.children[slot]) {
+            Child::Leaf { first, count } => Some((first, count)),
+            Child::Node(_) => None,
+        })
     }
 
     fn set_child(&mut self, slot: usize, node: &Node, child: Child) {

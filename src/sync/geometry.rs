@@ -1,39 +1,13 @@
-//! Meshes and instances → the two levels of the hierarchy.
+//! Instances → the top level of the hierarchy.
 
-use super::{Instructions, MaterialNumbers, Redone, RenderOrigin};
-use crate::bvh::{Blas, Placement, Tlas};
+use super::{Instructions, MaterialNumbers, MeshBlas, Redone, RenderOrigin};
+use crate::bvh::{Placement, Tlas};
 use crate::scene::{GlobalTransform, Instance, Mesh};
 use crate::trace::Geometry;
 use crate::trace::scene::InstanceData;
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::sync::Arc;
-
-/// The bottom-level hierarchy of a [`Mesh`], on its entity; derived by [`build_blas`].
-#[derive(Component, Clone, Debug)]
-pub struct MeshBlas(pub Arc<Blas>);
-
-/// Builds the BLAS of each new mesh, and fits that of a changed one to it if it can be.
-pub fn build_blas(
-    mut commands: Commands,
-    mut redone: ResMut<Redone>,
-    changed: Query<(Entity, &Mesh, Option<&MeshBlas>), Changed<Mesh>>,
-    mut removed: RemovedComponents<Mesh>,
-) {
-    for (entity, mesh, old) in &changed {
-        let triangles: Vec<[Vec3; 3]> = (0..mesh.0.triangles.len()).map(|i| mesh.0.corners(i)).collect();
-        let refitted = old.and_then(|MeshBlas(old)| old.refit(&triangles));
-        redone.refits += u64::from(refitted.is_some());
-        let blas = refitted.unwrap_or_else(|| Blas::build(&triangles));
-        commands.entity(entity).insert(MeshBlas(Arc::new(blas)));
-        redone.blas += 1;
-    }
-    for entity in removed.read() {
-        if let Ok(mut entity) = commands.get_entity(entity) {
-            entity.remove::<MeshBlas>();
-        }
-    }
-}
 
 /// Picks [`RenderOrigin`] when the first geometry is there: the scene's middle, rounded to a multiple of a
 /// power of two not below its extent, so that a scene around the origin stays where it is.

@@ -2,7 +2,7 @@
 //!
 //! | changed | redone |
 //! |---|---|
-//! | a mesh | its own BLAS (refitted, where that is good enough), then the TLAS |
+//! | a mesh | its own BLAS (found, if there is one of the same triangles; refitted, where that is good enough), then the TLAS |
 //! | an instance, its transform; one added or removed | the TLAS |
 //! | a material or texture | the surface list (and the lights, for its emission) |
 //! | a light or its transform | the light list |
@@ -12,10 +12,12 @@
 
 mod geometry;
 mod lights;
+mod meshes;
 mod surfaces;
 
-pub use geometry::{MeshBlas, build_blas, choose_origin, sync_geometry};
+pub use geometry::{choose_origin, sync_geometry};
 pub use lights::sync_lights;
+pub use meshes::{BlasCache, MeshBlas, build_blas};
 pub use surfaces::{MaterialNumbers, sync_coverage, sync_surfaces};
 
 use crate::bvh::Isa;
