@@ -4,9 +4,15 @@
 pub mod closed;
 pub mod containment;
 mod rng;
+pub mod scenes;
 
 pub use containment::check;
 pub use rng::Rng;
+
+#[path = "mod.rs"]
+mod support;
+
+pub use support::shared;
 
 use glam::{DAffine3, Vec3};
 use penumbra::bvh::{Aabb, Blas, Hit, Isa, Placement, Probe, Ray};
@@ -112,4 +118,9 @@ pub fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
 }
 pub fn place(triangles: &[[Vec3; 3]], world_from_local: DAffine3) -> Placement {
     Placement::new(Arc::new(Blas::build(triangles)), world_from_local).unwrap()
+}
+
+/// Whether to take the time for the full counts.
+pub fn long() -> bool {
+    std::env::var_os("PENUMBRA_LONG").is_some()
 }
