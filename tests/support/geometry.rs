@@ -12,6 +12,7 @@ pub use rng::Rng;
 #[path = "mod.rs"]
 mod support;
 
+#[allow(unused_imports, reason = "each test file uses its part")]
 pub use support::shared;
 
 use glam::{DAffine3, Vec3};
