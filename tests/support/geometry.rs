@@ -1,6 +1,7 @@
 //! Triangles, rays, and the oracle that tries every triangle.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub mod balls;
 pub mod closed;
 pub mod containment;
 mod rng;
@@ -17,14 +18,29 @@ pub use support::shared;
 
 use glam::{DAffine3, Vec3};
 use penumbra::bvh::{Aabb, Blas, Hit, Isa, Placement, Probe, Ray};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Every triangle tried with the same routine, by the same rule about equals.
 pub fn brute_force(triangles: &[[Vec3; 3]], ray: &Ray) -> Option<Hit> {
     let bounds = triangles.iter().fold(Aabb::EMPTY, |a, t| a.union(Aabb::around(t)));
-    let probe = Probe::new(ray, &bounds);
+    brute_force_in(&bounds, triangles, ray)
+}
+
+/// The same with known bounds.
+pub fn brute_force_in(bounds: &Aabb, triangles: &[[Vec3; 3]], ray: &Ray) -> Option<Hit> {
+    brute_force_among(bounds, (0..).zip(triangles), ray)
+}
+
+/// The same among some of the triangles, given with their numbers.
+pub fn brute_force_among<'a>(
+    bounds: &Aabb,
+    triangles: impl Iterator<Item = (u32, &'a [Vec3; 3])>,
+    ray: &Ray,
+) -> Option<Hit> {
+    let probe = Probe::new(ray, bounds);
     let mut best: Option<Hit> = None;
-    for (triangle, corners) in (0..).zip(triangles) {
+    for (triangle, corners) in triangles {
         if let Some(h) = probe.triangle(corners, best.map_or(ray.t_max, |b| b.t)) {
             let hit = Hit { t: h.t, u: h.u, v: h.v, triangle, instance: 0 };
             if best.is_none_or(|b| hit.beats(&b)) {
@@ -80,7 +96,7 @@ pub fn same_as_brute_force(name: &str, triangles: &[[Vec3; 3]], rays: usize) {
         })
         .filter(|ray| ray.direction != Vec3::ZERO && ray.direction.is_finite() && ray.origin.is_finite())
         .collect();
-    let expected: Vec<Option<Hit>> = all.iter().map(|ray| brute_force(triangles, ray)).collect();
+    let expected: Vec<Option<Hit>> = all.par_iter().map(|ray| brute_force(triangles, ray)).collect();
     let ends: Vec<(Ray, Ray)> = all
         .iter()
         .zip(&expected)
@@ -91,21 +107,20 @@ pub fn same_as_brute_force(name: &str, triangles: &[[Vec3; 3]], rays: usize) {
         .collect();
     all.extend(ends.iter().flat_map(|&(at, before)| [at, before]));
     let expected: Vec<Option<Hit>> = expected
-        .into_iter()
-        .chain(ends.iter().flat_map(|(at, before)| {
+        .into_par_iter()
+        .chain(ends.par_iter().flat_map_iter(|(at, before)| {
             let hit = brute_force(triangles, at);
             assert!(hit.is_some(), "{name}: t_max itself counts");
             [hit, brute_force(triangles, before)]
         }))
         .collect();
-    for isa in Isa::available() {
+    Isa::available().into_par_iter().for_each(|isa| {
         let name = format!("{name}, {}", isa.name());
-        for (i, (hit, expected)) in
-            ask(&name, &blas.clone().with_isa(isa), &all).iter().zip(&expected).enumerate()
-        {
+        let hits = ask(&name, &blas.clone().with_isa(isa), &all);
+        for (i, (hit, expected)) in hits.iter().zip(&expected).enumerate() {
             assert_eq!(hit, expected, "{name}: ray {i} {:?}", all[i]);
         }
-    }
+    });
 }
 
 pub fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
@@ -117,6 +132,7 @@ pub fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
         })
         .collect()
 }
+
 pub fn place(triangles: &[[Vec3; 3]], world_from_local: DAffine3) -> Placement {
     Placement::new(Arc::new(Blas::build(triangles)), world_from_local).unwrap()
 }

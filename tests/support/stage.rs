@@ -4,6 +4,7 @@
 
 mod rng;
 
+#[allow(unused_imports, reason = "each test file uses its part")]
 pub use rng::Rng;
 
 use bevy_ecs::prelude::*;
