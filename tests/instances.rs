@@ -149,9 +149,12 @@ fn a_mirrored_scene_is_the_mirror_image() {
     }
 }
 
-/// The depths of a machine of instances, and of all its triangles in one mesh, where they are placed. Where one
-/// shows another part than the other, or nothing, the ray passes a silhouette: one that is moved by as much as
-/// vertices are rounded shows the same.
+/// The depths of a machine of instances, and of all its triangles in one mesh, where they are placed: within 4 ulp and
+/// a millionth of the size. Measured across the surface: rounding moves the corners of the flat mesh, and along a
+/// ray that grazes a triangle that is farther. How many rays differ by more along themselves is printed (4 of 80,000).
+///
+/// Where one shows another part than the other, or nothing, the ray passes a silhouette: one that is moved by
+/// as much as corners are rounded shows the same.
 #[test]
 fn an_engine_of_instances_equals_its_flat_mesh() {
     let Some(shared) = shared("an_engine_of_instances_equals_its_flat_mesh") else {
@@ -159,7 +162,8 @@ fn an_engine_of_instances_equals_its_flat_mesh() {
     };
     let file = shared.join("scenes/gltf/TwoCylinderEngine.glb");
     let instanced = tlas_of(&scenes::placed_meshes(&file), DAffine3::IDENTITY);
-    let flat = Blas::build(&scenes::triangles(&file));
+    let triangles = scenes::triangles(&file);
+    let flat = Blas::build(&triangles);
     let bounds = flat.bounds();
     let size = (bounds.max - bounds.min).max_element();
     let mut rays = rays_into(&bounds, 40_000);
@@ -176,35 +180,46 @@ fn an_engine_of_instances_equals_its_flat_mesh() {
         let hits = closest_hits(&instanced, &rays);
         let mut flat_hits = vec![None; rays.len()];
         flat.closest_hits(&rays, &mut flat_hits);
-        let same = |ray: &Ray, a: Option<Hit>, b: Option<Hit>| match (a, b) {
+        // Along the ray, or across the triangle of the flat mesh.
+        let near = |ray: &Ray, a: Option<Hit>, b: Option<Hit>, across: bool| match (a, b) {
             (Some(a), Some(b)) => {
-                // In space, as the mark is: 4 ulp of the distance and 1e-6 of the size.
                 let length = ray.direction.length();
+                let [p, q, r] = triangles[b.triangle as usize].map(Vec3::as_dvec3);
+                let normal = (q - p).cross(r - p).normalize().as_vec3();
+                let slope = if across { normal.dot(ray.direction).abs() / length } else { 1.0 };
                 let step = (a.t.next_up() - a.t) * length;
-                (a.t - b.t).abs() * length <= 4.0 * step + 1e-6 * size
+                (a.t - b.t).abs() * length * slope <= 4.0 * step + 1e-6 * size
             }
             (None, None) => true,
             _ => false,
         };
+        let same = |ray: &Ray, a: Option<Hit>, b: Option<Hit>| near(ray, a, b, true);
+        let pairs = rays.iter().zip(&hits).zip(&flat_hits);
+        let grazing =
+            pairs.filter(|&((ray, &a), &b)| near(ray, a, b, true) && !near(ray, a, b, false)).count();
         let (mut silhouettes, mut wrong) = (0, 0);
         for ((ray, &hit), &flat_hit) in rays.iter().zip(&hits).zip(&flat_hits) {
             if same(ray, hit, flat_hit) {
                 continue;
             }
             silhouettes += 1;
-            let near = (0..27).any(|i| {
+            let explained = (0..27).any(|i| {
                 let by = Vec3::new((i % 3) as f32 - 1.0, (i / 3 % 3) as f32 - 1.0, (i / 9) as f32 - 1.0);
                 let moved = Ray { origin: ray.origin + by * (1e-6 * size), ..*ray };
                 same(ray, hit, flat.closest_hit(&moved)) || same(ray, instanced.closest_hit(&moved), flat_hit)
             });
-            if !near {
+            if !explained {
                 wrong += 1;
                 println!("{ray:?}: {hit:?}, flat {flat_hit:?}");
             }
         }
         let seen = hits.iter().flatten().count();
-        println!("{}: {seen} of {} rays hit, {silhouettes} at silhouettes", isa.name(), rays.len());
-        assert!(seen > rays.len() / 8 && silhouettes * 500 < seen);
+        println!(
+            "{}: {seen} of {} rays hit, {silhouettes} at silhouettes, {grazing} graze",
+            isa.name(),
+            rays.len()
+        );
+        assert!(seen > rays.len() / 8 && silhouettes * 500 < seen && grazing * 2000 < seen);
         assert_eq!(wrong, 0, "{}", isa.name());
     }
 }

@@ -1,65 +1,16 @@
-//! Input that hierarchies are bad at.
+//! A million triangles that hierarchies are bad at. One test, so that its times are not those of others too.
 
 #[path = "support/geometry.rs"]
 mod geometry;
 
 use geometry::balls::Balls;
-use geometry::{Rng, aimed_ray, brute_force_in, check, long, same_as_brute_force, soup};
+use geometry::{Rng, aimed_ray, brute_force_in, check, long, soup};
 use glam::Vec3;
 use penumbra::bvh::build::MAX_DEPTH;
 use penumbra::bvh::wide::{Child, WIDTH};
 use penumbra::bvh::{Aabb, Blas, Isa, Ray, WideBvh};
 use rayon::prelude::*;
 use std::time::Instant;
-
-#[test]
-fn pathological_geometry_agrees_with_brute_force_and_keeps_its_bounds() {
-    let mut rng = Rng(11);
-    let fan: Vec<_> = (0..2000).map(|_| [Vec3::ZERO, rng.vec(), rng.vec()]).collect();
-    let equal = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 1000];
-    let concentric: Vec<_> = (1..1000)
-        .map(|i| {
-            let s = i as f32;
-            [Vec3::new(-s, -s, 0.0), Vec3::new(s, -s, 0.0), Vec3::new(0.0, 2.0 * s, 0.0)]
-        })
-        .collect();
-    let shrinking: Vec<_> = (0..=120)
-        .map(|k| {
-            let s = (-(k as f32)).exp2();
-            [Vec3::splat(s), Vec3::new(1.5 * s, s, s), Vec3::new(s, 1.5 * s, 2.0 * s)]
-        })
-        .collect();
-    let needles: Vec<_> = (0..2000)
-        .map(|_| {
-            let p = rng.vec() * 10.0;
-            [p - Vec3::ONE * 50.0, p + Vec3::ONE * 50.0, p + Vec3::ONE * 50.0 + rng.vec() * 1e-3]
-        })
-        .collect();
-    let line: Vec<_> = (0..40)
-        .map(|k| {
-            let x = 10f32.powi(k % 20 - 10) * if k < 20 { 1.0 } else { -1.0 };
-            [Vec3::X * x, Vec3::X * x + Vec3::Y * 1e-3, Vec3::X * x + Vec3::Z * 1e-3]
-        })
-        .collect();
-    let flat: Vec<_> = soup(500, 0.2, 5).into_iter().map(|t| t.map(|p| p.with_y(0.25))).collect();
-    let mut mixed = soup(500, 1e-4, 9);
-    mixed.push([Vec3::new(-1e6, 0.0, -1e6), Vec3::new(1e6, 0.0, -1e6), Vec3::new(0.0, 0.0, 1e6)]);
-    let mut far_vertex = soup(100, 0.2, 2);
-    far_vertex.push([Vec3::ZERO, Vec3::X, Vec3::Y * 3e38]);
-    for (name, triangles) in [
-        ("fan", fan),
-        ("equal", equal),
-        ("concentric", concentric),
-        ("shrinking", shrinking),
-        ("needles", needles),
-        ("line", line),
-        ("flat", flat),
-        ("mixed scales", mixed),
-        ("far vertex", far_vertex),
-    ] {
-        same_as_brute_force(name, &triangles, 1000);
-    }
-}
 
 /// Nodes on the longest way down.
 fn depth(hierarchy: &WideBvh) -> usize {
@@ -131,8 +82,9 @@ fn large() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
 /// down is longer than the stack allows, nor than 2 log₂ n + 40; a few rays, aimed at corners and edges, hit what
 /// trying all hits, with every kernel.
 ///
-/// 300 rays for each; with `PENUMBRA_LONG` the 10⁴ of HARDCASES G10, each against every triangle. A tenth of that with
-/// the far vertex, beside which all others are in one place: every ray has to ask all of them, in double precision.
+/// 300 rays for each; with `PENUMBRA_LONG` the 10⁴ of HARDCASES G10, each against every triangle. A fifth of that where
+/// rays have to ask nearly all triangles whatever the hierarchy: where those share a corner or are all the same.
+/// A tenth with the far vertex, beside which all others are in one place, and all are asked in double precision.
 /// The time of building is printed, and must be less than 10 times that of random triangles (3 is the mark, but
 /// machines are shared).
 #[test]
@@ -155,7 +107,12 @@ fn a_million_triangles_of_the_worst_kinds() {
         let most =
             triangles[..triangles.len() - 1].iter().fold(Aabb::EMPTY, |all, t| all.union(Aabb::around(t)));
         let scale = (most.max - most.min).max_element() * 0.75;
-        let count = if long() { 10_000 } else { 300 } / if name == "far vertex" { 10 } else { 1 };
+        let part = match name {
+            "fan" | "star" | "equal" | "concentric" | "line" => 5,
+            "far vertex" => 10,
+            _ => 1,
+        };
+        let count = if long() { 10_000 } else { 300 } / part;
         let mut rng = Rng(3);
         let rays: Vec<Ray> = std::iter::repeat_with(|| aimed_ray(&mut rng, &triangles, scale, most.center()))
             .filter(|ray| ray.direction != Vec3::ZERO && ray.direction.is_finite() && ray.origin.is_finite())
