@@ -1,5 +1,5 @@
 //! Triangles, rays, and the oracle that tries every triangle.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, unused_imports, reason = "each test file uses its part")]
 
 pub mod balls;
 pub mod closed;
@@ -13,7 +13,6 @@ pub use rng::Rng;
 #[path = "mod.rs"]
 mod support;
 
-#[allow(unused_imports, reason = "each test file uses its part")]
 pub use support::shared;
 
 use glam::{DAffine3, Vec3};

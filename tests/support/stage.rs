@@ -1,10 +1,9 @@
 //! A stage to measure light on: a world, something that receives, a camera that sees nothing else.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, unused_imports, reason = "each test file uses its part")]
 #![allow(clippy::print_stdout, reason = "a test shows its figures")]
 
 mod rng;
 
-#[allow(unused_imports, reason = "each test file uses its part")]
 pub use rng::Rng;
 
 use bevy_ecs::prelude::*;
