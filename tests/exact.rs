@@ -174,10 +174,10 @@ fn hits_are_those_of_exact_arithmetic() {
             if let [.., last] = below[..] {
                 let relative = below.iter().fold(0.0f64, |worst, o| worst.max(o.epsilons));
                 let quantile = below[below.len() * 999 / 1000].ulps;
+                let (hits, worst) = (below.len(), last.ulps);
                 println!(
-                    "  condition < {limit}: {} hits, t off by at worst {relative:.2} ε, {:.2} ulp, 99.9 % {quantile:.2} ulp",
-                    below.len(),
-                    last.ulps
+                    "  condition < {limit}: {hits} hits, t off by at worst {relative:.2} ε, {worst:.2} ulp, \
+                     99.9 % {quantile:.2} ulp"
                 );
             }
         }

@@ -27,8 +27,8 @@ pub fn check_hierarchy(hierarchy: &WideBvh, triangles: &[[Vec3; 3]]) -> Result<(
             let Child::Leaf { first, count } = Child::unpack(node.children[slot]) else {
                 continue;
             };
-            for entry in first..first + count {
-                if around[entry].replace(node.child_bounds(slot)).is_some() {
+            for (entry, around) in (first..).zip(&mut around[first..first + count]) {
+                if around.replace(node.child_bounds(slot)).is_some() {
                     return Err(format!("entry {entry} is in two leaves"));
                 }
             }
