@@ -138,9 +138,10 @@ fn outcome(kernels: &[Isa], case: &Case) -> Outcome {
 /// Hit or miss: no other answer than the exact one where the margins are above 8 ε times the sizes of the products
 /// (`truth` says how both are measured).
 ///
-/// t: within ε max(16, 4 condition) of the exact one, relative, below a condition of 1000. The mark of HARDCASES G2 is
-/// 16 ε there. It is met below 8, and not met above: measured below 1000 at worst 150 ε (unit), 469 ε (of any size),
-/// 0.5 ε (sliver), 254 ε (glancing) and 85 ε (near an edge); 99.9 % are within 16, 258, 0.5, 371 and 17 ulp.
+/// t: within 16 ε of the exact one, relative, below a condition of 8; within 4 ε times the condition from there to
+/// 1000. The mark of HARDCASES G2 is 16 ε up to 1000, and is not met: measured below 1000 at worst 150 ε (unit), 469 ε
+/// (of any size), 0.5 ε (sliver), 254 ε (glancing) and 85 ε (near an edge); 99.9 % are within 16, 258, 0.5, 371 and
+/// 17 ulp.
 ///
 /// Why: t is the mean of the corners' distances weighted by edge functions in single precision. These have errors
 /// of some ε of their products, which move the point in the plane; seen at a flat angle that is farther along the
@@ -182,10 +183,11 @@ fn hits_are_those_of_exact_arithmetic() {
             }
         }
         assert_eq!(count(|o| o.wrong && o.certain), 0, "{name}");
-        let measure = |o: &Off| o.epsilons / (4.0 * o.condition).max(16.0);
+        let bound = |o: &Off| if o.condition < 8.0 { 16.0 } else { 4.0 * o.condition };
+        let measure = |o: &Off| o.epsilons / bound(o);
         let decent = off.iter().filter(|o| o.condition < 1e3);
         let worst = decent.max_by(|a, b| measure(a).total_cmp(&measure(b))).unwrap();
-        println!("  condition < 1000: at worst {:.2} of ε max(16, 4 condition)", measure(worst));
+        println!("  condition < 1000: at worst {:.2} of what is allowed", measure(worst));
         assert!(measure(worst) <= 1.0, "{name}: {worst:?}");
     }
 }
