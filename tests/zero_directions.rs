@@ -59,7 +59,7 @@ impl Grid {
     }
 
     fn blas(&self) -> Blas {
-        let triangles: Vec<_> = self.triangles.iter().map(|t| t.map(|p| p.as_vec3())).collect();
+        let triangles: Vec<_> = self.triangles.iter().map(|t| t.map(IVec3::as_vec3)).collect();
         Blas::build(&triangles)
     }
 }
@@ -171,7 +171,7 @@ fn tiny_direction_components_miss_nothing() {
                 let met = hits[i].map(|hit| (hit.t, grid.triangles[hit.triangle as usize]));
                 if let Some((t, corners)) = met.filter(|(_, [a, b, c])| a.z == b.z && b.z == c.z) {
                     let point = origin.as_vec3() * 0.5 + Vec3::Z * t;
-                    let square = Aabb::around(&corners.map(|p| p.as_vec3()));
+                    let square = Aabb::around(&corners.map(IVec3::as_vec3));
                     assert!(square.contains(&Aabb::around(&[point])), "{what}");
                 }
             }
