@@ -5,21 +5,20 @@
     reason = "a test shows its figures, and fails at the first wrong one"
 )]
 
+#[path = "support/alone.rs"]
+mod alone;
 #[path = "support/stage.rs"]
 mod stage;
 
+use alone::Alone;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
-use penumbra::bvh::{Blas, Hit, Placement, Ray, Tlas};
+use penumbra::bvh::{Hit, Isa, Ray};
 use penumbra::scene::{Glass, Glossy, Light, Material, TriangleMesh};
 use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::light::FlatLight;
-use penumbra::trace::scene::InstanceData;
 use penumbra::trace::surface::Interaction;
-use penumbra::trace::{
-    Coverage, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint,
-};
+use penumbra::trace::{Integrator, Lights};
 use stage::{Estimate, Rng, Stage, ball, cube, quad, reds, settings};
-use std::sync::Arc;
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 
@@ -275,42 +274,6 @@ fn a_closed_room_is_exactly_dark_whatever_shines_outside() {
     }
 }
 
-/// One placed triangle as a scene.
-struct Alone {
-    geometry: Geometry,
-    surfaces: Surfaces,
-    coverage: Coverage,
-    lights: Lights,
-    viewpoint: Viewpoint,
-    settings: RenderSettings,
-}
-
-impl Alone {
-    fn new(mesh: TriangleMesh, place: DAffine3) -> Option<Self> {
-        let triangles: Vec<_> = (0..mesh.triangles.len()).map(|i| mesh.corners(i)).collect();
-        let placement = Placement::new(Arc::new(Blas::build(&triangles)), place)?;
-        let normal_matrix = place.matrix3.inverse().transpose();
-        let data = InstanceData { mesh: Arc::new(mesh), materials: Vec::new(), normal_matrix };
-        Some(Self {
-            geometry: Geometry { tlas: Tlas::build(vec![placement]), instances: vec![data] },
-            surfaces: Surfaces::default(),
-            coverage: Coverage::default(),
-            lights: Lights::default(),
-            viewpoint: Viewpoint::default(),
-            settings: RenderSettings::default(),
-        })
-    }
-
-    fn scene(&self) -> TraceScene<'_> {
-        let Self { geometry, surfaces, coverage, lights, viewpoint, settings } = self;
-        TraceScene { geometry, surfaces, coverage, lights, viewpoint, settings }
-    }
-
-    fn at(&self, hit: &Hit, ray: &Ray) -> Interaction {
-        Interaction::new(&self.scene(), &self.geometry.instances[0], hit, ray)
-    }
-}
-
 /// Rays that leave random points of the triangle on the side of the eye: how many come back to it.
 fn returns(alone: &Alone, rng: &mut Rng, points: u32, rays: u32) -> (u32, u32) {
     let tlas = &alone.geometry.tlas;
@@ -352,6 +315,7 @@ fn roundness([a, b, c]: [Vec3; 3]) -> f64 {
 #[test]
 fn no_ray_comes_back_to_the_triangle_it_leaves() {
     let mut rng = Rng(3);
+    let kernels = Isa::available();
     let (mut tried, mut back) = ([0; 2], [0; 2]);
     for i in 0..2000 {
         let mut coordinate = || rng.decades(-8.0, 8.0);
@@ -364,9 +328,10 @@ fn no_ray_comes_back_to_the_triangle_it_leaves() {
         };
         let mesh =
             TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
-        let Some(alone) = Alone::new(mesh, HERE) else {
+        let Some(mut alone) = Alone::new(mesh, HERE) else {
             continue;
         };
+        alone.geometry.tlas = alone.geometry.tlas.with_isa(kernels[i % kernels.len()]);
         let needle = usize::from(roundness(corners) < 1e-4);
         let (t, b) = returns(&alone, &mut rng, 20, 50);
         tried[needle] += t;
@@ -380,17 +345,19 @@ fn no_ray_comes_back_to_the_triangle_it_leaves() {
 #[test]
 fn no_ray_comes_back_to_the_placed_triangle_it_leaves() {
     let mut rng = Rng(4);
+    let kernels = Isa::available();
     let (mut tried, mut back) = (0, 0);
-    for _ in 0..1000 {
+    for i in 0..1000 {
         let corners = [0; 3].map(|_| rng.vec());
         let mesh =
             TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
         let scale = DVec3::new(0.0, 0.0, 0.0).map(|_| f64::from(rng.decades(-4.0, 4.0)));
         let at = DVec3::ZERO.map(|_| f64::from(rng.decades(-4.0, 4.0)));
         let place = DAffine3::from_scale_rotation_translation(scale, rng.rotation(), at);
-        let Some(alone) = Alone::new(mesh, place) else {
+        let Some(mut alone) = Alone::new(mesh, place) else {
             continue;
         };
+        alone.geometry.tlas = alone.geometry.tlas.with_isa(kernels[i % kernels.len()]);
         let (t, b) = returns(&alone, &mut rng, 20, 50);
         (tried, back) = (tried + t, back + b);
     }

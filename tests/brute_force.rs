@@ -1,0 +1,175 @@
+//! The hierarchy against trying every triangle: the same hits, bit for bit, from every kernel.
+
+#[path = "support/geometry.rs"]
+mod geometry;
+
+use geometry::balls::Balls;
+use geometry::{
+    Rng, aimed_ray, ask, brute_force, brute_force_in, check, long, same_as_brute_force, scenes, shared, soup,
+};
+use glam::{DVec3, Vec3};
+use penumbra::bvh::{Blas, Isa, Ray};
+use proptest::prelude::*;
+use rayon::prelude::*;
+
+#[test]
+fn closest_hit_agrees_with_brute_force() {
+    for (count, size) in [(1, 1.0), (2, 1.0), (5, 0.5), (100, 0.3), (3000, 0.1), (300, 3.0)] {
+        same_as_brute_force(&format!("{count} triangles of {size}"), &soup(count, size, 3), 2000);
+    }
+}
+
+#[test]
+fn pathological_geometry_agrees_with_brute_force_and_keeps_its_bounds() {
+    let mut rng = Rng(11);
+    let fan: Vec<_> = (0..2000).map(|_| [Vec3::ZERO, rng.vec(), rng.vec()]).collect();
+    let equal = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 1000];
+    let concentric: Vec<_> = (1..1000)
+        .map(|i| {
+            let s = i as f32;
+            [Vec3::new(-s, -s, 0.0), Vec3::new(s, -s, 0.0), Vec3::new(0.0, 2.0 * s, 0.0)]
+        })
+        .collect();
+    let shrinking: Vec<_> = (0..=120)
+        .map(|k| {
+            let s = (-(k as f32)).exp2();
+            [Vec3::splat(s), Vec3::new(1.5 * s, s, s), Vec3::new(s, 1.5 * s, 2.0 * s)]
+        })
+        .collect();
+    let needles: Vec<_> = (0..2000)
+        .map(|_| {
+            let p = rng.vec() * 10.0;
+            [p - Vec3::ONE * 50.0, p + Vec3::ONE * 50.0, p + Vec3::ONE * 50.0 + rng.vec() * 1e-3]
+        })
+        .collect();
+    let line: Vec<_> = (0..40)
+        .map(|k| {
+            let x = 10f32.powi(k % 20 - 10) * if k < 20 { 1.0 } else { -1.0 };
+            [Vec3::X * x, Vec3::X * x + Vec3::Y * 1e-3, Vec3::X * x + Vec3::Z * 1e-3]
+        })
+        .collect();
+    let flat: Vec<_> = soup(500, 0.2, 5).into_iter().map(|t| t.map(|p| p.with_y(0.25))).collect();
+    let mut mixed = soup(500, 1e-4, 9);
+    mixed.push([Vec3::new(-1e6, 0.0, -1e6), Vec3::new(1e6, 0.0, -1e6), Vec3::new(0.0, 0.0, 1e6)]);
+    let mut far_vertex = soup(100, 0.2, 2);
+    far_vertex.push([Vec3::ZERO, Vec3::X, Vec3::Y * 3e38]);
+    for (name, triangles) in [
+        ("fan", fan),
+        ("equal", equal),
+        ("concentric", concentric),
+        ("shrinking", shrinking),
+        ("needles", needles),
+        ("line", line),
+        ("flat", flat),
+        ("mixed scales", mixed),
+        ("far vertex", far_vertex),
+    ] {
+        same_as_brute_force(name, &triangles, 1000);
+    }
+}
+
+#[test]
+fn far_and_small_scenes_agree_with_brute_force() {
+    for scale in [1e-3, 1.0, 1e3] {
+        for shift in
+            [Vec3::ZERO, Vec3::splat(1e3), Vec3::splat(1e5), Vec3::new(148_376.0, 1234.0, -223_423.0)]
+        {
+            let mut triangles: Vec<_> =
+                soup(400, 0.3, 21).into_iter().map(|t| t.map(|p| p * scale + shift)).collect();
+            // Rounded to f32 some collapse to a line, which has no surface.
+            triangles.retain(|t| {
+                let [a, b, c] = t.map(Vec3::as_dvec3);
+                (b - a).cross(c - a) != DVec3::ZERO
+            });
+            if triangles.len() < 10 {
+                continue;
+            }
+            same_as_brute_force(&format!("scale {scale}, shift {shift}"), &triangles, 1000);
+        }
+    }
+}
+
+/// From so far away that triangles are tested in double precision, together with nearer ones that are not.
+#[test]
+fn a_ray_does_not_depend_on_how_far_away_its_neighbours_start() {
+    let triangles: Vec<_> = soup(300, 0.3, 4).into_iter().map(|t| t.map(|p| p * 1e11)).collect();
+    let mut rng = Rng(3);
+    let rays: Vec<Ray> = (0..2048)
+        .map(|i| {
+            let target = triangles[rng.below(triangles.len())].iter().sum::<Vec3>() / 3.0;
+            let from = Vec3::new(3.0, 2.0, 5.0).normalize() * if i % 2 == 0 { 2e11 } else { 4e12 };
+            Ray::new(target + from, -from)
+        })
+        .collect();
+    let blas = Blas::build(&triangles);
+    let expected: Vec<_> = rays.iter().map(|ray| brute_force(&triangles, ray)).collect();
+    assert!(expected.iter().flatten().count() > 1000);
+    for isa in Isa::available() {
+        let name = format!("near and far, {}", isa.name());
+        assert_eq!(ask(&name, &blas.clone().with_isa(isa), &rays), expected, "{name}");
+    }
+}
+
+/// 10⁶ rays to a mesh of 3732 triangles, half of them aimed at corners and edges: every kernel finds the same as
+/// trying all, bit for bit, in packets; one ray of 16 alone too. There is one builder and one width of nodes.
+///
+/// Triangles far away from a ray's line are known to be missed without asking, else this would take a minute; with
+/// `PENUMBRA_LONG` all are asked.
+#[test]
+fn a_million_rays_agree_with_brute_force() {
+    const RAYS: usize = 1_000_000;
+    let Some(shared) = shared("a_million_rays_agree_with_brute_force") else {
+        return;
+    };
+    let triangles = scenes::triangles(&shared.join("scenes/obj/wuson/wuson.obj"));
+    let blas = Blas::build(&triangles);
+    assert_eq!(check(&blas, &triangles), Ok(()));
+    let bounds = blas.bounds();
+    let scale = (bounds.max - bounds.min).max_element();
+    let balls = Balls::new(&triangles, scale);
+    let hits: usize = (0..RAYS / 4000)
+        .into_par_iter()
+        .map(|batch| {
+            let mut rng = Rng(batch as u64 * 77 + 5);
+            let rays: Vec<Ray> =
+                (0..4000).map(|_| aimed_ray(&mut rng, &triangles, scale, bounds.center())).collect();
+            let all = |ray: &Ray| brute_force_in(&bounds, &triangles, ray);
+            let near = |ray: &Ray| balls.brute_force(&bounds, &triangles, ray);
+            let expected: Vec<_> = rays.iter().map(|ray| if long() { all(ray) } else { near(ray) }).collect();
+            for isa in Isa::available() {
+                let blas = blas.clone().with_isa(isa);
+                let mut hits = vec![None; rays.len()];
+                let mut blocked = vec![false; rays.len()];
+                blas.closest_hits(&rays, &mut hits);
+                blas.any_hits(&rays, &mut blocked);
+                for (i, ray) in rays.iter().enumerate() {
+                    assert_eq!(hits[i], expected[i], "{}: {ray:?}", isa.name());
+                    assert_eq!(blocked[i], expected[i].is_some(), "{}, any: {ray:?}", isa.name());
+                    if i % 16 == batch % 16 {
+                        assert_eq!(blas.closest_hit(ray), expected[i], "{}, alone: {ray:?}", isa.name());
+                    }
+                }
+            }
+            expected.iter().flatten().count()
+        })
+        .sum();
+    println!("{} triangles, {hits} of {RAYS} rays hit", triangles.len());
+    assert!(hits > RAYS / 4);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn any_soup_agrees_with_brute_force(
+        corners in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-10.0f32..10.0)), 1..60),
+        rays in prop::collection::vec((prop::array::uniform3(-12.0f32..12.0), prop::array::uniform3(-1.0f32..1.0)), 1..20),
+    ) {
+        let triangles: Vec<[Vec3; 3]> = corners.iter().map(|t| t.map(Vec3::from_array)).collect();
+        let blas = Blas::build(&triangles);
+        prop_assert_eq!(check(&blas, &triangles), Ok(()));
+        for (origin, direction) in rays {
+            let ray = Ray::new(Vec3::from_array(origin), Vec3::from_array(direction));
+            prop_assert_eq!(blas.closest_hit(&ray), brute_force(&triangles, &ray));
+        }
+    }
+}

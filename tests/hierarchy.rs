@@ -1,0 +1,188 @@
+//! The structure itself: what checks it, refitting, threads.
+
+#[path = "support/geometry.rs"]
+mod geometry;
+
+use geometry::containment::check_hierarchy;
+use geometry::{Rng, aimed_ray, boxes, brute_force, check, soup};
+use glam::Vec3;
+use penumbra::bvh::wide::{Child, WIDTH};
+use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Node, WideBvh};
+
+/// A square of 3200 triangles, none of them long or steep enough to be split.
+fn wave() -> Vec<[Vec3; 3]> {
+    (0..1600)
+        .flat_map(|k| {
+            let point = |di: usize, dj: usize| {
+                let (x, z) = ((k % 40 + di) as f32 * 0.05 - 1.0, (k / 40 + dj) as f32 * 0.05 - 1.0);
+                Vec3::new(x, 0.2 * (x * 9.0).sin() * (z * 7.0).cos(), z)
+            };
+            let [a, b, c, d] = [point(0, 0), point(1, 0), point(1, 1), point(0, 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect()
+}
+
+#[test]
+fn a_refitted_hierarchy_hits_what_a_new_one_hits() {
+    let triangles = wave();
+    let blas = Blas::build(&triangles);
+    let bend = |amount: f32| -> Vec<[Vec3; 3]> {
+        triangles.iter().map(|t| t.map(|p| p + Vec3::Y * (p.x * 3.0).sin() * amount)).collect()
+    };
+    let mut rng = Rng(31);
+    let mut refitted = blas.clone();
+    for amount in [0.1, 0.2, 0.0] {
+        let moved = bend(amount);
+        refitted = refitted.refit(&moved).expect("bent a little");
+        assert_eq!(check(&refitted, &moved), Ok(()));
+        for _ in 0..1000 {
+            let ray = aimed_ray(&mut rng, &moved, 2.0, Vec3::ZERO);
+            assert_eq!(refitted.closest_hit(&ray), brute_force(&moved, &ray));
+        }
+    }
+    assert_eq!(refitted.cost(), blas.cost(), "bent back");
+    // Many small steps do not wear it out unseen.
+    let apart = |step: usize| -> Vec<[Vec3; 3]> {
+        let mut rng = Rng(5);
+        triangles
+            .iter()
+            .map(|t| (t, rng.vec()))
+            .map(|(t, v)| t.map(|p| p + v * 0.002 * step as f32))
+            .collect()
+    };
+    assert!(blas.refit(&apart(1)).is_some());
+    assert!((1..200).try_fold(blas.clone(), |blas, step| blas.refit(&apart(step))).is_none());
+    assert!(blas.refit(&triangles[1..]).is_none(), "one is missing");
+    let shuffled: Vec<_> = (0..3200).map(|i| triangles[i * 1237 % 3200]).collect();
+    assert!(blas.refit(&shuffled).is_none(), "all are elsewhere");
+    let mut without_place = triangles.clone();
+    without_place[7][1].x = f32::NAN;
+    assert!(blas.refit(&without_place).is_none());
+    let mut collapsed = triangles.clone();
+    collapsed[9] = [Vec3::ZERO; 3];
+    assert!(Blas::build(&collapsed).refit(&triangles).is_none(), "one has come back");
+}
+
+#[test]
+fn the_checker_finds_each_defect() {
+    let triangles = soup(200, 0.2, 8);
+    let boxes = boxes(&triangles);
+    let good = Bvh::build(&boxes);
+    assert_eq!(good.check(&boxes), Ok(()));
+    let inner = good.nodes.iter().position(|n| n.count == 0).unwrap();
+    let leaf = good.nodes.iter().position(|n| n.count > 0).unwrap();
+
+    let mut broken = good.clone();
+    broken.nodes[inner].max = broken.nodes[inner].min;
+    assert!(matches!(broken.check(&boxes), Err(Defect::ChildOutsideParent { .. })));
+    let mut broken = good.clone();
+    broken.nodes[leaf].max = broken.nodes[leaf].min;
+    assert!(matches!(broken.check(&boxes), Err(Defect::PrimOutsideLeaf { .. })));
+    let mut broken = good.clone();
+    broken.prims[1] = broken.prims[0];
+    assert!(broken.check(&boxes).is_err());
+    let mut broken = good.clone();
+    broken.nodes[inner].first = 1 << 30;
+    assert!(matches!(broken.check(&boxes), Err(Defect::Dangling { .. })));
+    let mut broken = good;
+    broken.nodes[leaf].count = 0;
+    broken.nodes[leaf].first = 0;
+    assert!(matches!(broken.check(&boxes), Err(Defect::Dangling { .. })), "no way back to the root");
+}
+
+#[test]
+fn the_checker_finds_a_path_longer_than_a_traversal_stack() {
+    // A chain: node 2 i is inner, node 2 i − 1 a leaf of one box beside it.
+    let chain = |levels: u32| {
+        let (min, max) = (Vec3::ZERO, Vec3::ONE);
+        let mut nodes = vec![Node { min, first: 1, max, count: 0 }];
+        for level in 1..=levels {
+            nodes.push(Node { min, first: level - 1, max, count: 1 });
+            nodes.push(Node { min, first: 2 * level + 1, max, count: 0 });
+        }
+        *nodes.last_mut().unwrap() = Node { min, first: levels, max, count: 1 };
+        Bvh { nodes, prims: (0..=levels).collect() }.check(&vec![Aabb { min, max }; levels as usize + 1])
+    };
+    assert_eq!(chain(20), Ok(()));
+    assert!(matches!(chain(200), Err(Defect::TooDeep { .. })));
+}
+
+#[test]
+fn the_build_is_the_same_for_any_number_of_threads() {
+    let boxes = boxes(&soup(50_000, 0.01, 6));
+    let build = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Bvh::build(&boxes))
+    };
+    let (one, four) = (build(1), build(4));
+    assert_eq!((one.nodes, one.prims), (four.nodes, four.prims));
+}
+
+/// Cuts `part` of the box of each leaf in turn away, along one axis.
+fn shrunk(hierarchy: &WideBvh, part: f32) -> impl Iterator<Item = WideBvh> {
+    let slots = (0..hierarchy.nodes.len()).flat_map(|node| (0..WIDTH).map(move |slot| (node, slot)));
+    slots.enumerate().filter_map(move |(turn, (node, slot))| {
+        let bounds = hierarchy.nodes[node].child_bounds(slot);
+        let is_leaf = matches!(Child::unpack(hierarchy.nodes[node].children[slot]), Child::Leaf { .. });
+        let axis = turn % 3;
+        let shorter = bounds.max[axis] - part * (bounds.max[axis] - bounds.min[axis]);
+        (is_leaf && !bounds.is_empty() && shorter < bounds.max[axis]).then(|| {
+            let mut broken = hierarchy.clone();
+            broken.nodes[node].bounds[axis][1][slot] = shorter;
+            broken
+        })
+    })
+}
+
+#[test]
+fn the_checker_finds_a_leaf_that_is_too_small() {
+    // Of whole triangles every box is as small as can be.
+    let whole = wave();
+    let blas = Blas::build(&whole);
+    assert_eq!(blas.hierarchy().prims.len(), whole.len(), "none was split");
+    assert_eq!(check(&blas, &whole), Ok(()));
+    for broken in shrunk(blas.hierarchy(), 0.01) {
+        let found = check_hierarchy(&broken, &whole);
+        assert!(found.as_ref().is_err_and(|why| why.contains("sticks out")), "{found:?}");
+    }
+    // Parts of a needle hold only their own points.
+    let mut rng = Rng(4);
+    let needles: Vec<[Vec3; 3]> = (0..3)
+        .map(|_| {
+            let across = rng.vec() * 0.1;
+            [rng.vec() - Vec3::ONE * 50.0, Vec3::ONE * 50.0 + across, Vec3::ONE * 50.0 - across]
+        })
+        .collect();
+    let blas = Blas::build(&needles);
+    let parts = blas.hierarchy().prims.len();
+    assert!((9..300).contains(&parts), "fewer parts than points: {parts}");
+    assert_eq!(check(&blas, &needles), Ok(()));
+    let (mut found, mut tried) = (0, 0);
+    for broken in shrunk(blas.hierarchy(), 0.5) {
+        found += usize::from(check_hierarchy(&broken, &needles).is_err());
+        tried += 1;
+    }
+    println!("{parts} parts of 3 needles: {found} of {tried} shrunk leaves found by sampled points");
+    assert!(found * 2 > tried, "{found} of {tried}");
+}
+
+#[test]
+fn the_checker_finds_a_part_that_is_missing() {
+    let needle = [[Vec3::splat(-50.0), Vec3::new(50.0, 50.1, 50.0), Vec3::new(50.0, 50.0, 50.1)]];
+    let blas = Blas::build(&needle);
+    assert_eq!(check(&blas, &needle), Ok(()));
+    let parts = blas.hierarchy().prims.len();
+    assert!((5..100).contains(&parts), "{parts}");
+    let mut other = needle.to_vec();
+    other.push(needle[0]);
+    assert!(check(&blas, &other).is_err_and(|why| why.contains("is in no leaf")));
+    for entry in 0..parts {
+        let mut broken = blas.hierarchy().clone();
+        broken.prims[entry] = 1;
+        assert!(check_hierarchy(&broken, &other).is_err(), "entry {entry}");
+    }
+    let mut broken = blas.hierarchy().clone();
+    broken.prims[0] = 7;
+    assert!(check_hierarchy(&broken, &needle).is_err());
+}
