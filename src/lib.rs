@@ -19,3 +19,4 @@ pub mod sync;
 pub mod trace;
 #[cfg(feature = "view")]
 pub mod view;
+pub mod watch;

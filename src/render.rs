@@ -7,8 +7,8 @@ use crate::image::files::linear_pixels;
 use crate::image::{Display, ErrorLog, ImageError, save};
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
-use crate::trace::convergence::{Convergence, DARK_ENOUGH, FEWEST_TO_STOP, first_look, next_look};
 use crate::trace::{Film, Geometry, Integrator, RayCounts, RenderSettings};
+use crate::watch::{Seen, Watch};
 use glam::UVec2;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -172,7 +172,7 @@ pub fn render(
         scene.app.world.insert_resource(film);
     }
     let size = scene.app.world.resource::<RenderSettings>().size;
-    let mut log = match &job.error_log {
+    let log = match &job.error_log {
         Some((reference, log)) => Some(ErrorLog::create(log, reference_picture(reference, size)?)?),
         None => None,
     };
@@ -188,23 +188,18 @@ pub fn render(
     app.world
         .insert_resource(FrameBudget { interrupt: Arc::clone(&job.interrupt), ..FrameBudget::default() });
     let tracing = Instant::now();
-    // What looking at the picture took is no tracing.
-    let mut looking = Duration::ZERO;
-    let looks = job.noise.is_some() || log.is_some();
-    let mut look = first_look(app.world.resource::<Film>().complete_samples());
-    let mut convergence = Convergence::default();
+    let mut watch = Watch::new(job.noise, log, app.world.resource::<Film>().complete_samples());
     let mut first_picture_seconds = None;
     let mut seconds_to_noise = None;
-    let mut logged_samples = None;
     let mut step = 1;
     let end = loop {
-        let left = job.time_limit.map(|limit| limit.saturating_sub(tracing.elapsed() - looking));
+        let left = job.time_limit.map(|limit| limit.saturating_sub(tracing.elapsed() - watch.spent));
         if left.is_some_and(|left| left.is_zero()) {
             break End::Time;
         }
         {
             let mut budget = app.world.resource_mut::<FrameBudget>();
-            budget.sample_target = if looks { target.min(look) } else { target };
+            budget.sample_target = watch.until(target);
             budget.pass_samples = step;
             // With a limit passes may end in the middle; without, they are whole.
             budget.time = left.map(|left| left.min(PASS));
@@ -217,32 +212,16 @@ pub fn render(
         let stats = app.world.resource::<FrameStats>();
         let film = app.world.resource::<Film>();
         let complete = film.complete_samples();
-        let seconds = (tracing.elapsed() - looking).as_secs_f64();
+        let seconds = (tracing.elapsed() - watch.spent).as_secs_f64();
         if stats.samples_per_pixel >= 1.0 {
             first_picture_seconds.get_or_insert_with(|| start.elapsed().as_secs_f64());
         }
         if stats.noise.is_some_and(|noise| noise < 0.02) {
             seconds_to_noise.get_or_insert(seconds);
         }
-        let mut quiet_enough = false;
-        if looks && stats.done {
-            let began = Instant::now();
-            if let Some(noise) = stats.noise {
-                convergence.note(f64::from(complete), noise);
-                quiet_enough = complete >= FEWEST_TO_STOP && job.noise.is_some_and(|goal| noise <= goal);
-            }
-            if let Some(log) = &mut log {
-                log.note(film, seconds, stats.noise)?;
-                logged_samples = Some(film.mean_samples());
-            }
-            look = next_look(complete);
-            looking += began.elapsed();
-        }
+        let seen = if stats.done { watch.look(film, seconds, stats.noise) } else { Seen::Noisy };
         let made = stats.samples_per_pixel - resumed_samples;
-        let seconds_left = |goal| {
-            let left = convergence.samples_to(goal)? - stats.samples_per_pixel;
-            (made > 0.0).then(|| left.max(0.0) * seconds / made)
-        };
+        let seconds_left = |samples: f64| (samples - stats.samples_per_pixel).max(0.0) * seconds / made;
         progress(&Progress {
             samples: stats.samples_per_pixel,
             resumed: resumed_samples,
@@ -251,36 +230,32 @@ pub fn render(
             limit: job.time_limit.map(|l| l.as_secs_f64()),
             noise: stats.noise,
             noise_goal: job.noise,
-            seconds_to_noise: job.noise.and_then(seconds_left),
+            seconds_to_noise: watch.samples_to_goal().map(seconds_left).filter(|s| s.is_finite()),
         });
-        if quiet_enough {
-            break End::Noise;
-        }
-        if complete >= target {
-            break End::Samples;
-        }
-        if job.noise.is_some() && stats.noise.is_none() && complete >= DARK_ENOUGH {
-            break End::Dark;
+        match seen {
+            Seen::QuietEnough => break End::Noise,
+            Seen::Noisy if complete >= target => break End::Samples,
+            Seen::Dark => break End::Dark,
+            Seen::Noisy => {}
         }
         if job.interrupt.load(Ordering::Relaxed) {
             break End::Interrupted;
         }
     };
-    let render_seconds = (tracing.elapsed() - looking).as_secs_f64();
+    let render_seconds = (tracing.elapsed() - watch.spent).as_secs_f64();
 
     let film = app.world.resource::<Film>();
     let noise = crate::trace::noise::relative_noise(film);
-    if let Some(log) = &mut log
-        && logged_samples != Some(film.mean_samples())
-    {
-        log.note(film, render_seconds, noise)?;
-    }
+    watch.log(film, render_seconds, noise);
     // Where somebody may want to go on, the film says how far it was to go.
     let planned = (job.noise.is_none() && target < u32::MAX - first_sample)
         .then(|| first_sample..first_sample + target.max(film.complete_samples()));
     let display = *app.world.resource::<Display>();
     let header = identity.map(|identity| Header::new(identity, planned, &display));
     save_all(&job.outputs, film, &display, header.as_ref())?;
+    if let Some(trouble) = watch.trouble {
+        return Err(trouble.into());
+    }
     let settings = app.world.resource::<RenderSettings>();
     let stats = app.world.resource::<FrameStats>();
     Ok(RenderSummary {

@@ -16,7 +16,7 @@
 //! were dropped because they were not finite; its pixels in rows from the top. A pixel: for each half (even
 //! samples, odd samples) how many samples it has less than the tile; then the sums of the even half, red,
 //! green and blue, and of the odd half, as multiples of 2⁻⁶⁰. Counts and sums are written as
-//! [`numbers`](super::numbers) says, which for a usual picture comes to 40 to 50 bytes a pixel. There is no time in it
+//! [`numbers`](super::numbers) says, which for a usual picture comes to 25 to 45 bytes a pixel. There is no time in it
 //! and no name of a machine: the same samples make the same bytes.
 
 use super::numbers::{Reader, write_count, write_sum};
