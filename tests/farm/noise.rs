@@ -7,6 +7,7 @@ use penumbra::load::{LoadOptions, SceneSource};
 use penumbra::open::{Wishes, open};
 use penumbra::scene::color::luminance;
 use penumbra::trace::convergence::next_look;
+use penumbra::trace::noise::relative_error;
 use penumbra::trace::{Film, Integrator};
 use std::path::Path;
 
@@ -69,7 +70,7 @@ fn a_dark_picture_does_not_wait_for_ever() {
 }
 
 #[test]
-fn the_error_log_holds_the_true_error() {
+fn the_error_log_holds_the_relative_error_of() {
     let folder = fresh("log");
     let with = |more: &[&'static str]| succeeds(&folder, &[&SMALL, more].concat());
     with(&["--spp", "4096", "--seed", "5", "-o", "truth.exr", "-o", "truth.film"]);
@@ -110,6 +111,8 @@ fn the_error_log_holds_the_true_error() {
     );
 }
 
+const SIZE: UVec2 = UVec2::new(32, 32);
+
 /// Pictures of `samples` samples, and their estimated noise.
 struct Scene {
     name: &'static str,
@@ -118,7 +121,7 @@ struct Scene {
 
 impl Scene {
     fn render(&self, seed: u32, samples: u32, noise: Option<f64>) -> (Vec<f64>, Option<f64>, Film) {
-        let size = UVec2::new(24, 24);
+        let size = SIZE;
         let (seed, integrator) = (Some(seed), Some(self.integrator));
         // Short paths: light that comes round many corners is rare, and its error is what 100 runs don't tell.
         let wishes = Wishes { size: Some(size), seed, integrator, max_depth: Some(2), ..Wishes::default() };
@@ -152,13 +155,9 @@ fn brightness(color: Vec3) -> f64 {
     f64::from(luminance(color))
 }
 
-/// The noise number's own measure, with the truth in place of the estimate.
-fn true_error(picture: &[f64], truth: &[f64]) -> f64 {
-    let mut lit: Vec<f64> = truth.iter().copied().filter(|&t| t > 0.0).collect();
-    lit.sort_by(f64::total_cmp);
-    let floor = (0.1 * lit[lit.len() / 2]).powi(2);
-    let sum: f64 = picture.iter().zip(truth).map(|(p, t)| (p - t).powi(2) / (t * t + floor)).sum();
-    (sum / truth.len() as f64).sqrt()
+/// The truth is of the same size.
+fn relative_error_of(picture: &[f64], truth: &[f64]) -> f64 {
+    relative_error(picture, truth, SIZE).unwrap()
 }
 
 fn mean_and_spread(values: &[f64]) -> (f64, f64) {
@@ -182,7 +181,7 @@ fn the_noise_is_the_true_error_over_a_hundred_runs() {
             let mut errors = Vec::new();
             for seed in 0..100 {
                 let (picture, noise, _) = scene.render(seed, samples, None);
-                let error = true_error(&picture, &truth);
+                let error = relative_error_of(&picture, &truth);
                 errors.push(error);
                 ratios.push(noise.unwrap() / error);
             }
@@ -203,7 +202,7 @@ fn an_estimate_a_third_too_large_is_found() {
     let ratios: Vec<f64> = (0..20)
         .map(|seed| {
             let (picture, ..) = scene.render(seed, 16, None);
-            scene.render(seed, 8, None).1.unwrap() / true_error(&picture, &truth)
+            scene.render(seed, 8, None).1.unwrap() / relative_error_of(&picture, &truth)
         })
         .collect();
     let (ratio, _) = mean_and_spread(&ratios);
@@ -217,7 +216,7 @@ fn pictures_that_stopped_at_a_noise_level_have_that_error() {
     let (truth, ..) = scene.render(777, 16_384, None);
     let goal = 0.04;
     let ratios: Vec<f64> =
-        (0..100).map(|seed| true_error(&scene.render(seed, 0, Some(goal)).0, &truth) / goal).collect();
+        (0..100).map(|seed| relative_error_of(&scene.render(seed, 0, Some(goal)).0, &truth) / goal).collect();
     let (ratio, spread) = mean_and_spread(&ratios);
     println!("true error over the goal of {goal}: {ratio:.3} ± {spread:.3}");
     assert!((0.75..1.05).contains(&ratio), "{ratio} ± {spread}");
