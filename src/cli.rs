@@ -15,8 +15,10 @@ use std::time::Duration;
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
-#[command(after_help = "Exit codes: 0 done; 1 failed; 2 bad command line; 3 scene not readable; \
-4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved).")]
+#[command(
+    after_help = "Exit codes: 0 done; 1 failed (also: a film is damaged or does not fit); 2 bad command line; 3 scene not readable; \
+4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved)."
+)]
 pub struct Cli {
     /// What to do; nothing opens the window.
     #[command(subcommand)]
