@@ -8,7 +8,7 @@
 #[path = "support/stage.rs"]
 mod stage;
 
-use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, UVec2, Vec2, Vec3, Vec4};
 use penumbra::app::{FrameBudget, FrameStats};
 use penumbra::bvh::Ray;
 use penumbra::scene::{Glossy, Light, Material};
