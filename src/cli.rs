@@ -15,8 +15,10 @@ use std::time::Duration;
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
-#[command(after_help = "Exit codes: 0 done; 1 failed; 2 bad command line; 3 scene not readable; \
-4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved).")]
+#[command(
+    after_help = "Exit codes: 0 done; 1 failed (also: a film is damaged or does not fit); 2 bad command line; 3 scene not readable; \
+4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved)."
+)]
 pub struct Cli {
     /// What to do; nothing opens the window.
     #[command(subcommand)]
@@ -34,6 +36,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Say how much picture A differs from reference B
     Compare(CompareArgs),
+    /// Make one picture of films that hold different samples of it
+    Merge(MergeArgs),
 }
 
 /// Arguments of the window.
@@ -64,8 +68,8 @@ pub struct RenderArgs {
 /// Where a headless render goes and when it ends.
 #[derive(Debug, Args)]
 pub struct OutputArgs {
-    /// File to write: .png (developed) or .exr (linear); may be given several times [default: SCENE.png,
-    /// or nothing with --json]
+    /// File to write: .png (developed), .exr (linear) or .film (to --resume or merge); may be given several
+    /// times [default: SCENE.png, or nothing with --json]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
     /// Stop tracing after this many seconds
@@ -74,6 +78,18 @@ pub struct OutputArgs {
     /// Render just these sample indices, A up to but not including B
     #[arg(long, value_name = "A..B", value_parser = sample_range, conflicts_with = "spp")]
     pub sample_range: Option<Range<u32>>,
+    /// Stop at this noise, such as 1% or 0.01 (--spp and --time-limit may stop it earlier)
+    #[arg(long, value_name = "X", value_parser = noise)]
+    pub noise: Option<f64>,
+    /// Go on with this film; N of --spp counts what it holds
+    #[arg(long, value_name = "FILM")]
+    pub resume: Option<PathBuf>,
+    /// Picture (.exr best) or film to measure the true error by
+    #[arg(long, value_name = "FILE", requires = "error_log")]
+    pub reference: Option<PathBuf>,
+    /// Table of true error against seconds and samples
+    #[arg(long, value_name = "FILE.csv", requires = "reference")]
+    pub error_log: Option<PathBuf>,
     /// Print one JSON object about the render to standard output
     #[arg(long)]
     pub json: bool,
@@ -153,6 +169,33 @@ pub struct CompareArgs {
     pub fail_above: Option<f64>,
 }
 
+/// Arguments of `merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// Films of one picture, made with -o NAME.film
+    #[arg(required = true, value_name = "FILM")]
+    pub films: Vec<PathBuf>,
+    /// File to write: .film, .exr or .png; may be given several times
+    #[arg(short, long, required = true, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Samples that must be there, no more and no less [default: from the first to the last that a film was to
+    /// hold]
+    #[arg(long, value_name = "A..B", value_parser = sample_range)]
+    pub sample_range: Option<Range<u32>>,
+    /// Let samples be missing
+    #[arg(long)]
+    pub allow_gaps: bool,
+    /// Exposure of a .png in stops [default: that of the first film]
+    #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true)]
+    pub exposure: Option<f32>,
+    /// What happens above white in a .png [default: as in the first film]
+    #[arg(long, value_enum)]
+    pub tone_map: Option<ToneMapArg>,
+    /// Nothing on standard error but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// See [`Integrator`].
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum IntegratorArg {
@@ -180,6 +223,15 @@ pub enum ToneMapArg {
     Neutral,
 }
 
+impl From<ToneMapArg> for ToneMap {
+    fn from(arg: ToneMapArg) -> Self {
+        match arg {
+            ToneMapArg::Clip => Self::Clip,
+            ToneMapArg::Neutral => Self::Neutral,
+        }
+    }
+}
+
 impl SceneArgs {
     /// Which scene.
     ///
@@ -202,7 +254,7 @@ impl SceneArgs {
         Wishes {
             size: self.resolution,
             samples: range.as_ref().map(|r| r.end - r.start).or(self.spp),
-            first_sample: range.map_or(0, |r| r.start),
+            first_sample: range.map(|r| r.start),
             integrator: self.integrator.map(|i| match i {
                 IntegratorArg::Direct => Integrator::Direct,
                 IntegratorArg::Path => Integrator::Path,
@@ -214,10 +266,7 @@ impl SceneArgs {
                 FilterArg::Bilinear => Filter::Bilinear,
             }),
             exposure: self.exposure,
-            tone_map: self.tone_map.map(|t| match t {
-                ToneMapArg::Clip => ToneMap::Clip,
-                ToneMapArg::Neutral => ToneMap::Neutral,
-            }),
+            tone_map: self.tone_map.map(ToneMap::from),
             isa: self.isa,
             camera: self.camera.clone(),
             pose: Pose {
@@ -278,6 +327,17 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(number).map_err(|e| e.to_string())
 }
 
+fn noise(text: &str) -> Result<f64, String> {
+    let (digits, unit) = text.strip_suffix('%').map_or((text, 1.0), |digits| (digits, 0.01));
+    let number: f64 = digits.trim().parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    let noise = number * unit;
+    if 0.0 < noise && noise <= 1.0 {
+        Ok(noise)
+    } else {
+        Err("must lie above 0 and be at most 1, which is 100%; write 1% or 0.01".to_owned())
+    }
+}
+
 fn sample_range(text: &str) -> Result<Range<u32>, String> {
     let wrong = || format!("\"{text}\" is not a range such as 16..64");
     let (start, end) = text.split_once("..").ok_or_else(wrong)?;
@@ -304,6 +364,10 @@ mod tests {
         assert_eq!(seconds("1.5s"), Ok(Duration::from_millis(1500)));
         for wrong in ["0x5", "5", "ax3", "65536x65536"] {
             assert!(resolution(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!((noise("1%"), noise("0.02"), noise("100 %")), (Ok(0.01), Ok(0.02), Ok(1.0)));
+        for wrong in ["0", "-1%", "5", "nan", "inf", "%", "x"] {
+            assert!(noise(wrong).is_err(), "{wrong}");
         }
         assert!(vector("1,2").is_err() && vector("1,2,nan").is_err());
         assert!(sample_range("64..16").is_err() && view_angle("180").is_err() && exposure("nan").is_err());

@@ -8,6 +8,7 @@
 pub mod app;
 pub mod bvh;
 pub mod cli;
+pub mod farm;
 pub mod image;
 pub mod load;
 pub mod open;
@@ -18,3 +19,4 @@ pub mod sync;
 pub mod trace;
 #[cfg(feature = "view")]
 pub mod view;
+pub mod watch;

@@ -2,9 +2,10 @@
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
-use penumbra::cli::{Cli, Command, CompareArgs, OutputArgs, SceneArgs, WindowArgs};
-use penumbra::image::PictureFormat;
+use penumbra::cli::{Cli, Command, CompareArgs, MergeArgs, OutputArgs, SceneArgs, WindowArgs};
+use penumbra::farm::{self, is_film};
 use penumbra::image::compare::compare_files;
+use penumbra::image::{ImageError, PictureFormat, save};
 use penumbra::load::{LoadReport, built_in_scenes};
 use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
     let code = match cli.command {
         Some(Command::Render(args)) => headless(&args.scene, &args.output),
         Some(Command::Compare(args)) => compare(&args),
+        Some(Command::Merge(args)) => merge(&args),
         None if cli.window.list_scenes => {
             for scene in built_in_scenes() {
                 println!("{:<15} {}", scene.name, scene.description);
@@ -105,22 +107,34 @@ fn instead_of_window(args: &WindowArgs) -> u8 {
 }
 
 fn headless(scene: &SceneArgs, output: &OutputArgs) -> u8 {
-    let mut outputs = Vec::new();
-    for path in &output.output {
-        // NAME alone means both.
-        if path.extension().is_none() {
-            outputs.extend([path.with_extension("png"), path.with_extension("exr")]);
-        } else if let Err(error) = PictureFormat::of(path) {
+    let mut outputs = match files_to_write(&output.output) {
+        Ok(outputs) => outputs,
+        Err(error) => {
             eprintln!("error: {error}");
             return exit::BAD_COMMAND_LINE;
-        } else {
-            outputs.push(path.clone());
         }
-    }
+    };
     if outputs.is_empty() && !output.json {
         outputs.push(picture_of(scene));
     }
     headless_to(scene, output, outputs)
+}
+
+/// The files of `-o`, checked before any work is done.
+fn files_to_write(given: &[PathBuf]) -> Result<Vec<PathBuf>, ImageError> {
+    let mut outputs = Vec::new();
+    for path in given {
+        // NAME alone means both.
+        if path.extension().is_none() {
+            outputs.extend([path.with_extension("png"), path.with_extension("exr")]);
+        } else {
+            if !is_film(path) {
+                PictureFormat::of(path)?;
+            }
+            outputs.push(path.clone());
+        }
+    }
+    Ok(outputs)
 }
 
 /// `SCENE.png` in the current folder.
@@ -145,6 +159,9 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
         load: scene.load_options(),
         wishes: scene.wishes(output),
         time_limit: output.time_limit,
+        noise: output.noise,
+        resume: output.resume.clone(),
+        error_log: output.reference.clone().zip(output.error_log.clone()),
         outputs,
         interrupt,
     };
@@ -237,6 +254,19 @@ fn stop_on_signals(interrupt: &Arc<AtomicBool>) {
     }
 }
 
+/// How much of the work is done, and the seconds that are left; `None` until that can be told.
+fn how_far(progress: &Progress) -> (f64, Option<f64>) {
+    let made = progress.samples - progress.resumed;
+    let to_make = f64::from(progress.target) - progress.resumed;
+    let by_samples = (made / to_make > 0.01).then(|| progress.seconds * (to_make / made - 1.0));
+    let by_time = progress.limit.map(|limit| limit - progress.seconds);
+    // Whatever comes first ends it.
+    let ends = [by_samples, by_time, progress.seconds_to_noise];
+    let left = ends.into_iter().flatten().map(|left| left.max(0.0)).reduce(f64::min);
+    let part = left.map_or(0.0, |left| progress.seconds / (progress.seconds + left));
+    (if part.is_finite() { part } else { 0.0 }, left)
+}
+
 /// One line, redrawn on a terminal; elsewhere a line every few seconds.
 struct Bar {
     bar: Option<ProgressBar>,
@@ -255,16 +285,8 @@ impl Bar {
     }
 
     fn update(&self, progress: &Progress) {
-        let by_samples = progress.samples / f64::from(progress.target);
-        let part = progress
-            .limit
-            .map_or(by_samples, |limit| by_samples.max(progress.seconds / limit))
-            .clamp(0.0, 1.0);
-        let left = if part > 0.01 {
-            format!("{:.0} s left", progress.seconds / part * (1.0 - part))
-        } else {
-            "…".into()
-        };
+        let (part, left) = how_far(progress);
+        let left = left.map_or("—".to_owned(), |seconds| format!("{seconds:.0} s left"));
         let noise = progress.noise.map_or("—".to_owned(), |n| format!("{:.2} %", n * 100.0));
         let message = format!(
             "{:.0} samples per pixel, noise {noise}, {:.0} s, {left}",
@@ -286,6 +308,45 @@ impl Bar {
             bar.finish_and_clear();
         }
     }
+}
+
+fn merge(args: &MergeArgs) -> u8 {
+    let outputs = match files_to_write(&args.output) {
+        Ok(outputs) => outputs,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::BAD_COMMAND_LINE;
+        }
+    };
+    let merged = match farm::merge(&args.films, args.sample_range.clone(), args.allow_gaps) {
+        Ok(Some(merged)) => merged,
+        // The command line wants one at least.
+        Ok(None) => return exit::BAD_COMMAND_LINE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::FAILED;
+        }
+    };
+    let mut display = merged.header.display();
+    display.exposure = args.exposure.unwrap_or(display.exposure);
+    display.tone_map = args.tone_map.map_or(display.tone_map, Into::into);
+    for path in &outputs {
+        let written = if is_film(path) { merged.write(path) } else { save(path, &merged.film, &display) };
+        if let Err(error) = written {
+            eprintln!("error: {error}");
+            return exit::FAILED;
+        }
+    }
+    if !args.quiet {
+        let (fewest, most) = merged.samples();
+        let samples = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
+        let scene = &merged.header.identity.scene;
+        eprintln!("{scene}: {} films, {samples} samples per pixel", args.films.len());
+        for path in &outputs {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    0
 }
 
 fn compare(args: &CompareArgs) -> u8 {

@@ -20,8 +20,8 @@ pub struct Wishes {
     pub size: Option<UVec2>,
     /// Samples per pixel.
     pub samples: Option<u32>,
-    /// Index of the first sample.
-    pub first_sample: u32,
+    /// Index of the first sample; 0 if not said.
+    pub first_sample: Option<u32>,
     /// How light is gathered.
     pub integrator: Option<Integrator>,
     /// See [`RenderSettings::max_depth`].
@@ -114,7 +114,7 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let exposure = wishes.exposure.or(file.exposure);
     app.world.insert_resource(settings);
     app.world.insert_resource(Instructions(wishes.isa.unwrap_or_default()));
-    app.world.insert_resource(Film::new(settings.size, wishes.first_sample));
+    app.world.insert_resource(Film::new(settings.size, wishes.first_sample.unwrap_or(0)));
     let tone_map = wishes.tone_map.unwrap_or_default();
     app.world.insert_resource(Display { exposure: exposure.unwrap_or_default(), tone_map });
     if let Some(samples) = samples {

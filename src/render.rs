@@ -1,12 +1,17 @@
 //! Headless: frames until there are enough samples, then a file.
 
 use crate::app::{FrameBudget, FrameStats};
-use crate::image::{Display, ImageError, save};
+use crate::farm::{self, FilmError, FilmFile, Header, Identity, is_film};
+use crate::image::compare::{CompareError, LinearImage};
+use crate::image::files::linear_pixels;
+use crate::image::{Display, ErrorLog, ImageError, save};
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
 use crate::trace::{Film, Geometry, Integrator, RayCounts, RenderSettings};
+use crate::watch::{Seen, Watch};
+use glam::UVec2;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,7 +27,13 @@ pub struct RenderJob {
     pub wishes: Wishes,
     /// Stop after this much tracing.
     pub time_limit: Option<Duration>,
-    /// Files to write, `.png` or `.exr`.
+    /// Stop when the picture's relative noise is down to this.
+    pub noise: Option<f64>,
+    /// A film to go on with.
+    pub resume: Option<PathBuf>,
+    /// Reference and table: the true error as it falls.
+    pub error_log: Option<(PathBuf, PathBuf)>,
+    /// Files to write, `.png`, `.exr` or `.film`.
     pub outputs: Vec<PathBuf>,
     /// Raised from outside to stop and save what there is.
     pub interrupt: Arc<AtomicBool>,
@@ -34,9 +45,15 @@ pub enum RenderError {
     /// The scene cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// A file cannot be written.
+    /// A file cannot be written, or a reference not read.
     #[error(transparent)]
     Save(#[from] ImageError),
+    /// A film cannot be gone on with, or not serve as reference.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// The reference is of another size.
+    #[error(transparent)]
+    Reference(#[from] CompareError),
 }
 
 /// How far a render is.
@@ -44,6 +61,8 @@ pub enum RenderError {
 pub struct Progress {
     /// Samples a pixel has on average.
     pub samples: f64,
+    /// Those of them that were there from the start.
+    pub resumed: f64,
     /// Samples per pixel to make.
     pub target: u32,
     /// Seconds of tracing so far, and those it may take.
@@ -52,6 +71,10 @@ pub struct Progress {
     pub limit: Option<f64>,
     /// Estimated relative noise.
     pub noise: Option<f64>,
+    /// The noise to reach.
+    pub noise_goal: Option<f64>,
+    /// Seconds until then, as soon as that can be told.
+    pub seconds_to_noise: Option<f64>,
 }
 
 /// What was done: the object that `--json` prints.
@@ -81,6 +104,8 @@ pub struct RenderSummary {
     pub first_sample: u32,
     /// Samples per pixel, on average.
     pub samples: f64,
+    /// Those of them that were in the film gone on with.
+    pub resumed_samples: f64,
     /// Seconds of reading the files.
     pub load_seconds: f64,
     /// Seconds of building the hierarchies and the other arrays.
@@ -111,7 +136,7 @@ pub struct RenderSummary {
     pub outputs: Vec<String>,
     /// Stopped from outside before the target.
     pub interrupted: bool,
-    /// Stopped by the time limit before a target that somebody set.
+    /// Stopped by the time limit or the sample count before a target that somebody set.
     pub out_of_time: bool,
 }
 
@@ -120,37 +145,61 @@ const PASS: Duration = Duration::from_millis(250);
 /// If nobody says how many.
 const DEFAULT_SAMPLES: u32 = 64;
 
-/// Renders to the end, the time limit or an interruption, and writes the files in each case.
+/// Renders to the target, the noise goal, the time limit or an interruption, and writes the files in each case.
 ///
 /// # Errors
-/// If the scene cannot be opened or a file not written.
+/// If the scene cannot be opened, the film not gone on with, or a file not read or written.
 pub fn render(
     job: &RenderJob,
     opened: impl FnOnce(&Opened),
     mut progress: impl FnMut(&Progress),
 ) -> Result<RenderSummary, RenderError> {
     let start = Instant::now();
-    let scene = open(&job.source, &job.load, &job.wishes)?;
+    job.outputs.iter().try_for_each(|path| folder_exists(path))?;
+    let mut scene = open(&job.source, &job.load, &job.wishes)?;
+    let films = job.resume.is_some() || job.outputs.iter().any(|path| is_film(path));
+    let identity = films.then(|| Identity::of(&scene.app.world, job.source.name()));
+    let (mut planned, mut resumed_samples) = (None, 0.0);
+    if let (Some(path), Some(identity)) = (&job.resume, &identity) {
+        let file = FilmFile::read(path)?;
+        planned = file.header.planned.as_ref().map(|range| range.end.saturating_sub(range.start));
+        let film = file.resume(path, identity, job.wishes.first_sample)?;
+        resumed_samples = film.mean_samples();
+        scene
+            .report
+            .decisions
+            .push(format!("{}: goes on from {resumed_samples:.0} samples per pixel", path.display()));
+        scene.app.world.insert_resource(film);
+    }
+    let size = scene.app.world.resource::<RenderSettings>().size;
+    let log = match &job.error_log {
+        Some((reference, log)) => Some(ErrorLog::create(log, reference_picture(reference, size)?)?),
+        None => None,
+    };
     opened(&scene);
     let Opened { mut app, report, load_seconds, build_seconds, samples } = scene;
-    let target = samples.unwrap_or(if job.time_limit.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
+    // A noise goal is the target, unless the command line sets another beside it.
+    let asked = job.wishes.samples.or(if job.noise.is_some() { None } else { planned.or(samples) });
+    let open_end = job.time_limit.is_some() || job.noise.is_some();
+    let target = asked.unwrap_or(if open_end { u32::MAX } else { DEFAULT_SAMPLES });
+    let first_sample = app.world.resource::<Film>().first_sample();
+    let target = target.min(u32::MAX - first_sample);
 
-    app.world.insert_resource(FrameBudget {
-        sample_target: target,
-        interrupt: Arc::clone(&job.interrupt),
-        ..FrameBudget::default()
-    });
+    app.world
+        .insert_resource(FrameBudget { interrupt: Arc::clone(&job.interrupt), ..FrameBudget::default() });
     let tracing = Instant::now();
+    let mut watch = Watch::new(job.noise, log, app.world.resource::<Film>().complete_samples());
     let mut first_picture_seconds = None;
     let mut seconds_to_noise = None;
     let mut step = 1;
-    let interrupted = loop {
-        let left = job.time_limit.map(|limit| limit.saturating_sub(tracing.elapsed()));
+    let end = loop {
+        let left = job.time_limit.map(|limit| limit.saturating_sub(tracing.elapsed() - watch.spent));
         if left.is_some_and(|left| left.is_zero()) {
-            break false;
+            break End::Time;
         }
         {
             let mut budget = app.world.resource_mut::<FrameBudget>();
+            budget.sample_target = watch.until(target);
             budget.pass_samples = step;
             // With a limit passes may end in the middle; without, they are whole.
             budget.time = left.map(|left| left.min(PASS));
@@ -161,32 +210,51 @@ pub fn render(
             step = (step * 2).min(64);
         }
         let stats = app.world.resource::<FrameStats>();
-        let seconds = tracing.elapsed().as_secs_f64();
+        let film = app.world.resource::<Film>();
+        let complete = film.complete_samples();
+        let seconds = (tracing.elapsed() - watch.spent).as_secs_f64();
         if stats.samples_per_pixel >= 1.0 {
             first_picture_seconds.get_or_insert_with(|| start.elapsed().as_secs_f64());
         }
         if stats.noise.is_some_and(|noise| noise < 0.02) {
             seconds_to_noise.get_or_insert(seconds);
         }
+        let seen = if stats.done { watch.look(film, seconds, stats.noise) } else { Seen::Noisy };
+        let made = stats.samples_per_pixel - resumed_samples;
+        let seconds_left = |samples: f64| (samples - stats.samples_per_pixel).max(0.0) * seconds / made;
         progress(&Progress {
             samples: stats.samples_per_pixel,
+            resumed: resumed_samples,
             target,
             seconds,
             limit: job.time_limit.map(|l| l.as_secs_f64()),
             noise: stats.noise,
+            noise_goal: job.noise,
+            seconds_to_noise: watch.samples_to_goal().map(seconds_left).filter(|s| s.is_finite()),
         });
-        if stats.done {
-            break false;
+        match seen {
+            Seen::QuietEnough => break End::Noise,
+            Seen::Noisy if complete >= target => break End::Samples,
+            Seen::Dark => break End::Dark,
+            Seen::Noisy => {}
         }
         if job.interrupt.load(Ordering::Relaxed) {
-            break true;
+            break End::Interrupted;
         }
     };
-    let render_seconds = tracing.elapsed().as_secs_f64();
+    let render_seconds = (tracing.elapsed() - watch.spent).as_secs_f64();
 
     let film = app.world.resource::<Film>();
-    for path in &job.outputs {
-        save(path, film, app.world.resource::<Display>())?;
+    let noise = crate::trace::noise::relative_noise(film);
+    watch.log(film, render_seconds, noise);
+    // Where somebody may want to go on, the film says how far it was to go.
+    let planned = (job.noise.is_none() && target < u32::MAX - first_sample)
+        .then(|| first_sample..first_sample + target.max(film.complete_samples()));
+    let display = *app.world.resource::<Display>();
+    let header = identity.map(|identity| Header::new(identity, planned, &display));
+    save_all(&job.outputs, film, &display, header.as_ref())?;
+    if let Some(trouble) = watch.trouble {
+        return Err(trouble.into());
     }
     let settings = app.world.resource::<RenderSettings>();
     let stats = app.world.resource::<FrameStats>();
@@ -204,25 +272,91 @@ pub fn render(
         threads: rayon::current_num_threads(),
         isa: app.world.resource::<Geometry>().tlas.isa().name(),
         triangles: report.triangles,
-        first_sample: job.wishes.first_sample,
+        first_sample,
         samples: stats.samples_per_pixel,
+        resumed_samples,
         load_seconds,
         build_seconds,
         render_seconds,
         first_picture_seconds: first_picture_seconds.unwrap_or_else(|| start.elapsed().as_secs_f64()),
         seconds_to_noise_2_percent: seconds_to_noise,
-        samples_per_second: stats.samples_per_pixel / render_seconds,
+        samples_per_second: (stats.samples_per_pixel - resumed_samples) / render_seconds,
         rays: stats.rays,
         rays_per_second: stats.rays.total() as f64 / render_seconds,
-        noise: crate::trace::noise::relative_noise(film),
+        noise,
         dropped_samples: stats.dropped,
         peak_memory_bytes: peak_memory(),
         warnings: report.warnings,
         decisions: report.decisions,
         outputs: job.outputs.iter().map(|p| p.display().to_string()).collect(),
-        interrupted,
-        out_of_time: !interrupted && samples.is_some() && !stats.done,
+        interrupted: matches!(end, End::Interrupted),
+        out_of_time: match end {
+            End::Noise | End::Interrupted => false,
+            End::Samples => job.noise.is_some(),
+            End::Time => asked.is_some() || job.noise.is_some(),
+            End::Dark => true,
+        },
     })
+}
+
+/// Why a render ended.
+enum End {
+    /// All samples that were asked for.
+    Samples,
+    /// The noise goal.
+    Noise,
+    /// The time limit.
+    Time,
+    /// There is a noise goal but no light.
+    Dark,
+    /// From outside.
+    Interrupted,
+}
+
+/// Better now than after an hour of tracing.
+fn folder_exists(path: &Path) -> Result<(), ImageError> {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") && !folder.is_dir() => {
+            let source = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder");
+            Err(ImageError::Io { path: path.to_path_buf(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A picture file or a film, of this size.
+fn reference_picture(path: &Path, size: UVec2) -> Result<LinearImage, RenderError> {
+    let reference = if is_film(path) {
+        let film = FilmFile::read(path)?.film;
+        LinearImage { size: film.size(), pixels: linear_pixels(&film) }
+    } else {
+        LinearImage::open(path)?
+    };
+    if reference.size == size {
+        return Ok(reference);
+    }
+    let (b, size_b) = (path.display().to_string(), reference.size);
+    Err(CompareError::Size { a: "the render".to_owned(), size_a: size, b, size_b }.into())
+}
+
+/// Writes all files, each by its ending. One that cannot be written does not keep the others from it.
+///
+/// # Errors
+/// The first failure.
+pub fn save_all(
+    paths: &[PathBuf],
+    film: &Film,
+    display: &Display,
+    header: Option<&Header>,
+) -> Result<(), ImageError> {
+    let save = |path: &PathBuf| match header {
+        Some(header) if is_film(path) => {
+            farm::format::write(path, header, film, &farm::format::held_by(film))
+        }
+        _ => save(path, film, display),
+    };
+    let done: Vec<Result<(), ImageError>> = paths.iter().map(save).collect();
+    done.into_iter().collect()
 }
 
 /// From the kernel's own account of this process; `None` where there is no such file.

@@ -8,7 +8,7 @@
 #[path = "support/stage.rs"]
 mod stage;
 
-use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, UVec2, Vec2, Vec3, Vec4};
 use penumbra::app::{FrameBudget, FrameStats};
 use penumbra::bvh::Ray;
 use penumbra::scene::{Glossy, Light, Material};
@@ -16,6 +16,7 @@ use penumbra::trace::bsdf::{Bsdf, Lobes};
 use penumbra::trace::film::Pixel;
 use penumbra::trace::light::FlatLight;
 use penumbra::trace::mesh_light::MeshLight;
+use penumbra::trace::noise::relative_error;
 use penumbra::trace::scene::Surface;
 use penumbra::trace::shape_light::{Shape, ShapeLight};
 use penumbra::trace::surface::Interaction;
@@ -418,14 +419,10 @@ fn the_noise_estimate_is_the_true_error() {
         (reds(stage.film()), noise)
     };
     let (truth, _) = scene(12_345, 16_384);
-    let mut lit: Vec<f64> = truth.iter().copied().filter(|&t| t > 0.0).collect();
-    lit.sort_by(f64::total_cmp);
-    let floor = (0.1 * lit[lit.len() / 2]).powi(2);
     let (mut estimated, mut actual) = (Vec::new(), Vec::new());
     for seed in 0..100 {
         let (picture, noise) = scene(seed, 16);
-        let sum: f64 = picture.iter().zip(&truth).map(|(p, t)| (p - t).powi(2) / (t * t + floor)).sum();
-        actual.push((sum / truth.len() as f64).sqrt());
+        actual.push(relative_error(&picture, &truth, UVec2::splat(size)).unwrap());
         estimated.push(noise.expect("an estimate"));
     }
     let ratios: Vec<f64> = estimated.iter().zip(&actual).map(|(e, a)| e / a).collect();

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The name's ending is neither `.png` nor `.exr`.
-    #[error("{}: pictures are written as .png (developed, 8 bit) or .exr (linear, 32 bit float); give it one of these endings", path.display())]
+    #[error("{}: written are pictures, .png (developed, 8 bit) or .exr (linear, 32 bit float), and .film (to go on \
+             with or to merge); give it one of these endings", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -98,8 +99,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.part", std::process::id()));
     let part = path.with_file_name(name);
-    std::fs::write(&part, bytes).map_err(io)?;
-    std::fs::rename(&part, path).map_err(|source| {
+    std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path)).map_err(|source| {
         // The reason for the failure matters more than what is left over.
         let _ = std::fs::remove_file(&part);
         io(source)

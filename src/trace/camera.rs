@@ -49,6 +49,17 @@ impl Viewpoint {
         }
     }
 
+    /// In words, every bit of it, at its place in the world: `origin` is that of render space.
+    #[must_use]
+    pub fn description(&self, origin: DVec3) -> String {
+        let Self { origin: eye, right, up, back, half_height, perspective } = self;
+        let kind = if *perspective { "perspective" } else { "orthographic" };
+        let eye = eye.as_dvec3() + origin;
+        let [eye, ahead] = [eye.to_array(), (-back.as_dvec3()).to_array()];
+        let [up, right] = [up, right].map(Vec3::to_array);
+        format!("{kind} {half_height:?} at {eye:?} toward {ahead:?} up {up:?} right {right:?}")
+    }
+
     /// The ray through `point`, in pixels from the top left of a picture of `size`; unit direction.
     #[must_use]
     pub fn ray(&self, point: Vec2, size: UVec2) -> Ray {

@@ -86,6 +86,39 @@ impl Pixel {
     pub fn count(&self) -> u64 {
         u64::from(self.counts[0]) + u64::from(self.counts[1])
     }
+
+    /// Sums of both halves and three channels as multiples of 2⁻⁶⁰: all there is to know, for a file.
+    #[must_use]
+    pub fn sums(&self) -> [[i128; 3]; 2] {
+        self.sums.map(|half| half.map(|sum| sum.0))
+    }
+
+    /// How many samples each half has.
+    #[must_use]
+    pub fn counts(&self) -> [u32; 2] {
+        self.counts
+    }
+
+    /// What [`Pixel::sums`] and [`Pixel::counts`] were taken from; `None` if a sum is larger than so many
+    /// samples can make it.
+    #[must_use]
+    pub fn from_sums(sums: [[i128; 3]; 2], counts: [u32; 2]) -> Option<Self> {
+        let possible = |half: usize| {
+            let most = u128::from(counts[half]) << (35 + Sum::FRACTION_BITS);
+            sums[half].iter().all(|sum| sum.unsigned_abs() <= most)
+        };
+        (possible(0) && possible(1)).then(|| Self { sums: sums.map(|half| half.map(Sum)), counts })
+    }
+
+    /// Adds all samples of `other`, which must be of other indices. Exact, so no order matters.
+    pub fn merge(&mut self, other: &Self) {
+        for half in 0..2 {
+            for (sum, more) in self.sums[half].iter_mut().zip(other.sums[half]) {
+                sum.0 += more.0;
+            }
+            self.counts[half] += other.counts[half];
+        }
+    }
 }
 
 /// A square of the film that one thread works on at a time.
@@ -105,6 +138,11 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Rows from the top, to look at.
+    pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
+        self.pixels.iter().map(|pixel| if self.stale { &EMPTY } else { pixel })
+    }
+
     /// Rows from the top.
     pub fn pixels_mut(&mut self) -> &mut [Pixel] {
         if std::mem::take(&mut self.stale) {
@@ -149,6 +187,29 @@ impl Film {
             tile.dropped = 0;
             tile.stale = true;
         }
+    }
+
+    /// Adds all samples of `other`, which must be of other indices and of the same size. If indices are
+    /// missing between them, `next_sample` of a tile still says how many there are, but not which is next.
+    pub fn merge(&mut self, other: &Self) {
+        let first = self.first_sample.min(other.first_sample);
+        for (tile, more) in self.tiles.iter_mut().zip(&other.tiles) {
+            for (pixel, more) in tile.pixels_mut().iter_mut().zip(more.pixels()) {
+                pixel.merge(more);
+            }
+            let count = (tile.next_sample - self.first_sample) + (more.next_sample - other.first_sample);
+            tile.next_sample = first + count;
+            tile.dropped += more.dropped;
+        }
+        self.first_sample = first;
+    }
+
+    /// Says that the samples there are, however many in each tile, are those from `first_sample` on.
+    pub fn begin_at(&mut self, first_sample: u32) {
+        for tile in &mut self.tiles {
+            tile.next_sample = (tile.next_sample - self.first_sample) + first_sample;
+        }
+        self.first_sample = first_sample;
     }
 
     /// Index of the first sample that each pixel gets.

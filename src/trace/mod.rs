@@ -5,6 +5,7 @@
 
 pub mod bsdf;
 pub mod camera;
+pub mod convergence;
 pub mod film;
 pub mod integrator;
 pub mod light;

@@ -1,0 +1,95 @@
+//! What a film is a picture of: whoever differs in any of it has other samples.
+
+use super::Fingerprint;
+use crate::scene::Filter;
+use crate::sync::RenderOrigin;
+use crate::trace::{Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use bevy_ecs::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// All that a film's samples depend on, besides their indices. In words where people may want to read it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// Version of the program: another one may trace otherwise.
+    pub program: String,
+    /// Name of the scene, for people. Not compared: files may be renamed.
+    pub scene: String,
+    /// [`Fingerprint::of_scene`] in hexadecimal digits.
+    pub scene_hash: String,
+    /// [`Viewpoint::description`].
+    pub camera: String,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// `direct` or `path`.
+    pub integrator: String,
+    /// Bounces at most.
+    pub max_depth: u32,
+    /// `file`, `nearest` or `bilinear`.
+    pub filter: String,
+    /// Seed of the samples.
+    pub seed: u32,
+}
+
+impl Identity {
+    /// Of the picture that `world` makes. Call [`crate::app::App::build`] first.
+    #[must_use]
+    pub fn of(world: &World, scene: String) -> Self {
+        let viewpoint = world.resource::<Viewpoint>();
+        let settings = world.resource::<RenderSettings>();
+        let origin = world.resource::<RenderOrigin>().0.unwrap_or_default();
+        let arrays = TraceScene {
+            geometry: world.resource::<Geometry>(),
+            surfaces: world.resource::<Surfaces>(),
+            lights: world.resource::<Lights>(),
+            viewpoint,
+            settings,
+        };
+        Self {
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            scene,
+            scene_hash: format!("{:032x}", Fingerprint::of_scene(&arrays, origin)),
+            camera: viewpoint.description(origin),
+            width: settings.size.x,
+            height: settings.size.y,
+            integrator: match settings.integrator {
+                Integrator::Direct => "direct".to_owned(),
+                Integrator::Path => "path".to_owned(),
+            },
+            max_depth: settings.max_depth,
+            filter: match settings.filter {
+                None => "file".to_owned(),
+                Some(Filter::Nearest) => "nearest".to_owned(),
+                Some(Filter::Bilinear) => "bilinear".to_owned(),
+            },
+            seed: settings.seed,
+        }
+    }
+
+    /// What makes this another picture than `wanted`, each point in words; nothing if they are the same.
+    #[must_use]
+    pub fn differences(&self, wanted: &Self) -> Vec<String> {
+        let rows = |id: &Self| {
+            [
+                ("program version", id.program.clone()),
+                // The hash tells them apart; the name helps who reads it.
+                ("scene", format!("\"{}\" ({})", id.scene, id.scene_hash.get(..8).unwrap_or(&id.scene_hash))),
+                ("camera", id.camera.clone()),
+                ("size", format!("{}x{}", id.width, id.height)),
+                ("integrator", id.integrator.clone()),
+                ("max depth", id.max_depth.to_string()),
+                ("texture filter", id.filter.clone()),
+                ("seed", id.seed.to_string()),
+            ]
+        };
+        let same_scene = self.scene_hash == wanted.scene_hash;
+        rows(self)
+            .into_iter()
+            .zip(rows(wanted))
+            .filter(|((name, mine), (_, other))| if *name == "scene" { !same_scene } else { mine != other })
+            .map(|((name, mine), (_, other))| format!("{name} {mine}, not {other}"))
+            .collect()
+    }
+}
