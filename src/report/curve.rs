@@ -1,0 +1,98 @@
+//! Several runs of one method → one curve with a band.
+
+use super::measure::Run;
+use super::statistics::{Fit, fit_power};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// All runs at one sample count.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Seconds of tracing, the mean of the runs.
+    pub seconds: f64,
+    /// Root of the mean squared error of the runs.
+    pub rmse: f64,
+    /// The best run.
+    pub least: f64,
+    /// The worst run.
+    pub most: f64,
+    /// How many runs came so far.
+    pub runs: usize,
+}
+
+/// Where a fit begins: before, the error still depends on where the samples happen to lie.
+const FIT_FROM: u32 = 4;
+/// An error is taken as measured if it is so many times the reference's own.
+pub const TRUSTED: f64 = 4.0;
+
+/// One point for each sample count that several runs have; where just one goes on, also those.
+#[must_use]
+pub fn curve(runs: &[Run]) -> Vec<CurvePoint> {
+    let mut by_samples: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
+    for point in runs.iter().flat_map(|run| &run.points) {
+        by_samples.entry(point.samples).or_default().push((point.seconds, point.rmse));
+    }
+    // Runs that end by time end anywhere: such a point of one run would stand out among means of all.
+    let shared = by_samples.iter().filter(|(_, runs)| runs.len() > 1).map(|(&n, _)| n).max().unwrap_or(0);
+    by_samples
+        .into_iter()
+        .filter(|(samples, points)| points.len() > 1 || *samples > shared || runs.len() < 2)
+        .map(|(samples, points)| {
+            let n = points.len() as f64;
+            let errors = || points.iter().map(|p| p.1);
+            CurvePoint {
+                samples,
+                seconds: points.iter().map(|p| p.0).sum::<f64>() / n,
+                rmse: (errors().map(|e| e * e).sum::<f64>() / n).sqrt(),
+                least: errors().fold(f64::INFINITY, f64::min),
+                most: errors().fold(0.0, f64::max),
+                runs: points.len(),
+            }
+        })
+        .collect()
+}
+
+/// The slope over samples, of the points that the reference is good enough for.
+#[must_use]
+pub fn slope(curve: &[CurvePoint], reference_error: Option<f64>) -> Option<Fit> {
+    let trusted = |rmse: f64| reference_error.is_none_or(|error| rmse >= TRUSTED * error);
+    let points: Vec<(f64, f64)> = curve
+        .iter()
+        .filter(|point| point.samples >= FIT_FROM && trusted(point.rmse))
+        .map(|point| (f64::from(point.samples), point.rmse))
+        .collect();
+    fit_power(&points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::measure::Point;
+
+    fn run(points: &[(u32, f64)]) -> Run {
+        let points = points
+            .iter()
+            .map(|&(samples, rmse)| Point { samples, seconds: f64::from(samples), rmse, noise: None });
+        Run { points: points.collect(), ..Run::default() }
+    }
+
+    #[test]
+    fn a_run_that_ends_between_does_not_dent_the_curve() {
+        let runs = [run(&[(1, 3.0), (2, 2.0), (4, 1.0)]), run(&[(1, 4.0), (2, 2.0), (3, 9.0)])];
+        let curve = curve(&runs);
+        assert_eq!(curve.iter().map(|p| p.samples).collect::<Vec<_>>(), [1, 2, 4]);
+        assert!((curve[0].rmse - 12.5f64.sqrt()).abs() < 1e-12);
+        assert_eq!((curve[0].least, curve[0].most, curve[0].runs), (3.0, 4.0, 2));
+    }
+
+    #[test]
+    fn errors_as_small_as_the_reference_s_are_not_fitted() {
+        let all: Vec<(u32, f64)> = (0..8).map(|i| (1 << i, 0.5f64.powi(i))).collect();
+        let curve = curve(&[run(&all)]);
+        assert_eq!(slope(&curve, None).unwrap().points, 6);
+        assert_eq!(slope(&curve, Some(0.5f64.powi(7))).unwrap().points, 4);
+        assert_eq!(slope(&curve, Some(0.1)), None);
+    }
+}

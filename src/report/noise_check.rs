@@ -1,0 +1,131 @@
+//! Whether the noise number is right: many runs, each time beside the true error in the same measure.
+
+use super::measure::{Tracing, traceable};
+use super::statistics::{mean_and_deviation, percentile};
+use crate::app::App;
+use crate::image::compare::LinearImage;
+use crate::scene::color::luminance;
+use crate::trace::noise::relative_noise;
+use crate::trace::{Film, RenderSettings};
+use serde::Serialize;
+use std::sync::atomic::AtomicBool;
+
+/// The noise number over the true error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoiseCheck {
+    /// How many runs.
+    pub runs: usize,
+    /// Samples per pixel of each.
+    pub samples: u32,
+    /// Mean of the ratios.
+    pub mean: f64,
+    /// Standard error of that mean.
+    pub mean_error: f64,
+    /// Standard deviation of a single run.
+    pub deviation: f64,
+    /// 5th, 50th and 95th percentile.
+    pub percentiles: [f64; 3],
+    /// Root mean square of the true relative errors.
+    pub true_error: f64,
+    /// Each run's ratio.
+    pub ratios: Vec<f64>,
+}
+
+/// Runs to make.
+pub const RUNS: u32 = 100;
+/// Seeds from here on, so that no run is one of those whose curves are drawn.
+const FIRST_SEED: u32 = 1000;
+/// Samples per pixel of a run, at least and at most.
+const SAMPLES: (f64, f64) = (2.0, 64.0);
+
+/// Relative error of the picture's luminance, in the measure of [`relative_noise`], but with the reference's
+/// own brightness in the denominator: the picture's would be a part of what is judged.
+#[must_use]
+pub fn relative_error(film: &Film, reference: &LinearImage) -> Option<f64> {
+    let shown: Vec<f64> = (0..film.size().y)
+        .flat_map(|y| film.row(y))
+        .map(|pixel| f64::from(luminance(pixel.mean().as_vec3())))
+        .collect();
+    let truth: Vec<f64> = reference.pixels.iter().map(|&p| f64::from(luminance(p))).collect();
+    let mut lit: Vec<f64> = truth.iter().copied().filter(|&i| i > 0.0).collect();
+    if lit.is_empty() {
+        return None;
+    }
+    let middle = lit.len() / 2;
+    let median = *lit.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let floor = (0.1 * median).powi(2);
+    let square = |(&i, &t): (&f64, &f64)| (i - t).powi(2) / (t * t + floor);
+    let sum: f64 = shown.iter().zip(&truth).map(square).sum();
+    Some((sum / truth.len() as f64).sqrt())
+}
+
+/// Makes the runs, so that they take `seconds` in all; fewer if interrupted, `None` if hardly any.
+pub fn check(
+    app: &App,
+    settings: &RenderSettings,
+    reference: &LinearImage,
+    (seconds, samples_per_second): (f64, f64),
+    interrupt: &AtomicBool,
+    mut progress: impl FnMut(f64),
+) -> Option<NoiseCheck> {
+    let affordable = seconds * samples_per_second / f64::from(RUNS);
+    // A power of two, as the sequences are made for; NaN becomes the least.
+    let samples = affordable.clamp(SAMPLES.0, SAMPLES.1).log2().floor().exp2().max(SAMPLES.0) as u32;
+    let (mut ratios, mut errors, mut spent) = (Vec::new(), Vec::new(), 0.0);
+    for run in 0..RUNS {
+        let settings = RenderSettings { seed: FIRST_SEED + run, ..*settings };
+        let mut tracing = Tracing::new(traceable(app, &settings), interrupt);
+        while tracing.samples() < samples {
+            if !tracing.pass(samples) {
+                return NoiseCheck::of(samples, &ratios, &errors);
+            }
+        }
+        spent += tracing.seconds;
+        progress(spent);
+        let error = relative_error(&tracing.film, reference).filter(|&error| error > 0.0);
+        if let Some((noise, error)) = relative_noise(&tracing.film).zip(error) {
+            ratios.push(noise / error);
+            errors.push(error);
+        }
+    }
+    NoiseCheck::of(samples, &ratios, &errors)
+}
+
+impl NoiseCheck {
+    fn of(samples: u32, ratios: &[f64], errors: &[f64]) -> Option<Self> {
+        if ratios.len() < 2 {
+            return None;
+        }
+        let (mean, deviation) = mean_and_deviation(ratios);
+        let square: f64 = errors.iter().map(|e| e * e).sum();
+        Some(Self {
+            runs: ratios.len(),
+            samples,
+            mean,
+            mean_error: deviation / (ratios.len() as f64).sqrt(),
+            deviation,
+            percentiles: [0.05, 0.5, 0.95].map(|part| percentile(ratios, part).unwrap_or(f64::NAN)),
+            true_error: (square / errors.len() as f64).sqrt(),
+            ratios: ratios.to_vec(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{UVec2, Vec3};
+
+    #[test]
+    fn the_true_error_of_a_picture_that_is_off_everywhere() {
+        let mut film = Film::new(UVec2::new(4, 4), 0);
+        for pixel in film.tiles_mut()[0].pixels_mut() {
+            pixel.add(0, Vec3::splat(1.5));
+        }
+        let reference = LinearImage { size: UVec2::new(4, 4), pixels: vec![Vec3::ONE; 16] };
+        let error = relative_error(&film, &reference).unwrap();
+        assert!((error - 0.5 / 1.01f64.sqrt()).abs() < 1e-6, "{error}");
+        let black = LinearImage { size: UVec2::new(4, 4), pixels: vec![Vec3::ZERO; 16] };
+        assert_eq!(relative_error(&film, &black), None, "nothing to be relative to");
+    }
+}

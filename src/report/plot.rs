@@ -1,0 +1,266 @@
+//! Error curves as SVG.
+
+use super::curve::CurvePoint;
+use super::methods::{OURS, RANDOM};
+use super::{MethodReport, ReportError, SceneReport};
+use plotters::coord::Shift;
+use plotters::coord::combinators::WithKeyPoints;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// What the error is drawn over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Seconds of tracing.
+    Seconds,
+    /// Samples per pixel.
+    Samples,
+}
+
+/// Text and axes; [`for_page`] makes it the colour of the page's text.
+const INK: RGBColor = RGBColor(0x22, 0x24, 0x29);
+const INK_HEX: &str = "#222429";
+const PAPER_HEX: &str = "#FEFEFE";
+const PAPER: RGBColor = RGBColor(0xfe, 0xfe, 0xfe);
+/// Told apart by those who see few colours, on white and on black: after Okabe and Ito, "Color Universal
+/// Design", 2008. Ours gets the strongest.
+const COLORS: [(&str, RGBColor); 6] = [
+    (RANDOM, RGBColor(0xd5, 0x5e, 0x00)),
+    ("stratified", RGBColor(0xcc, 0x79, 0xa7)),
+    (OURS, RGBColor(0x1f, 0x83, 0xc4)),
+    ("shifted", RGBColor(0x00, 0x9e, 0x73)),
+    ("random-pixel", RGBColor(0xe6, 0x9f, 0x00)),
+    ("random-light", RGBColor(0x8a, 0x8d, 0x93)),
+];
+const SIZE: (u32, u32) = (780, 440);
+const LEGEND_WIDTH: u32 = 168;
+const FONT: &str = "sans-serif";
+
+type Plane<'a, 'b> =
+    ChartContext<'a, SVGBackend<'b>, Cartesian2d<WithKeyPoints<RangedCoordf64>, WithKeyPoints<RangedCoordf64>>>;
+
+/// The curves of all methods, log-log. On white.
+///
+/// # Errors
+/// If it cannot be drawn.
+pub fn curves(scene: &SceneReport, axis: Axis) -> Result<String, ReportError> {
+    let mut svg = String::new();
+    draw(&mut svg, scene, axis).map_err(ReportError::Plot)?;
+    Ok(svg)
+}
+
+/// The same for a page: no ground of its own, and text in the page's colour.
+#[must_use]
+pub fn for_page(svg: &str) -> String {
+    svg.replace(&format!("fill=\"{PAPER_HEX}\""), "fill=\"none\"").replace(INK_HEX, "currentColor")
+}
+
+fn x_of(axis: Axis, point: &CurvePoint) -> f64 {
+    match axis {
+        Axis::Seconds => point.seconds,
+        Axis::Samples => f64::from(point.samples),
+    }
+}
+
+fn text<E: std::fmt::Display>(error: E) -> String {
+    format!("the curves cannot be drawn: {error}")
+}
+
+fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String> {
+    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    root.fill(&PAPER).map_err(text)?;
+    let (left, legend) = root.split_horizontally(SIZE.0 - LEGEND_WIDTH);
+    let points: Vec<&CurvePoint> = scene.methods.iter().flat_map(|m| &m.curve).filter(|p| p.least > 0.0).collect();
+    let xs = || points.iter().map(|p| x_of(axis, p).log10());
+    let own = scene.reference.standard_error().filter(|&e| e > 0.0);
+    let (x0, x1) = (xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max));
+    let low = points.iter().map(|p| p.least).chain(own).fold(f64::INFINITY, f64::min).log10() - 0.1;
+    let high = points.iter().map(|p| p.most).fold(0.0, f64::max).log10() + 0.12;
+    if !(x0 < x1 && low < high) {
+        return Err(text(format!("{} has fewer than two points", scene.name)));
+    }
+    let (x_ticks, y_ticks) = (Ticks::new(x0, x1), Ticks::new(low, high));
+    let over = match axis {
+        Axis::Seconds => "seconds of tracing",
+        Axis::Samples => "samples per pixel",
+    };
+    let mut chart = ChartBuilder::on(&left)
+        .margin(12)
+        .caption(format!("{}: error over {over}", scene.name), (FONT, 16).into_font().color(&INK))
+        .x_label_area_size(44)
+        .y_label_area_size(62)
+        .build_cartesian_2d(x_ticks.range(x0, x1), y_ticks.range(low, high))
+        .map_err(text)?;
+    chart
+        .configure_mesh()
+        .bold_line_style(INK.mix(0.16))
+        .light_line_style(INK.mix(0.06))
+        .axis_style(INK.mix(0.6))
+        .label_style((FONT, 13).into_font().color(&INK))
+        .axis_desc_style((FONT, 14).into_font().color(&INK))
+        .x_desc(over)
+        .y_desc("RMSE")
+        .x_labels(x_ticks.bold.len())
+        .y_labels(y_ticks.bold.len())
+        .x_label_formatter(&|v| tick(*v))
+        .y_label_formatter(&|v| tick(*v))
+        .draw()
+        .map_err(text)?;
+    guides(&mut chart, scene, axis, (x0, x1), (low, high))?;
+    if let Some(own) = own.map(f64::log10) {
+        let floor = DashedLineSeries::new([(x0, own), (x1, own)], 2, 4, INK.mix(0.7).stroke_width(1));
+        chart.draw_series(floor).map_err(text)?;
+        label(&mut chart, "the reference's own error", (x0 + 0.02 * (x1 - x0), own), VPos::Bottom)?;
+    }
+    // Ours last, on top.
+    let mut methods: Vec<&MethodReport> = scene.methods.iter().collect();
+    methods.sort_by_key(|method| method.name == OURS);
+    for method in &methods {
+        band(&mut chart, method, axis)?;
+    }
+    for method in &methods {
+        line(&mut chart, method, axis)?;
+    }
+    keys(&legend, scene)?;
+    root.present().map_err(text)
+}
+
+fn style(method: &MethodReport) -> (RGBColor, u32) {
+    let color = COLORS.iter().find(|(name, _)| *name == method.name).map_or(INK, |(_, color)| *color);
+    (color, if method.name == OURS { 3 } else { 2 })
+}
+
+fn band(chart: &mut Plane, method: &MethodReport, axis: Axis) -> Result<(), String> {
+    let shared = || method.curve.iter().filter(|p| p.runs > 1 && p.least > 0.0);
+    let upper = shared().map(|p| (x_of(axis, p).log10(), p.most.log10()));
+    let lower = shared().rev().map(|p| (x_of(axis, p).log10(), p.least.log10()));
+    let outline: Vec<(f64, f64)> = upper.chain(lower).collect();
+    let (color, _) = style(method);
+    chart.draw_series([Polygon::new(outline, color.mix(0.2))]).map_err(text)?;
+    Ok(())
+}
+
+fn line(chart: &mut Plane, method: &MethodReport, axis: Axis) -> Result<(), String> {
+    let points: Vec<(f64, f64)> = method
+        .curve
+        .iter()
+        .filter(|p| p.rmse > 0.0)
+        .map(|p| (x_of(axis, p).log10(), p.rmse.log10()))
+        .collect();
+    let (color, width) = style(method);
+    let pen = color.stroke_width(width);
+    if method.ablation {
+        chart.draw_series(DashedLineSeries::new(points, 7, 4, pen)).map_err(text)?;
+    } else {
+        chart.draw_series(LineSeries::new(points, pen)).map_err(text)?;
+    }
+    Ok(())
+}
+
+/// Lines of slope −1/2 and −1 from above the first point of plain random sampling.
+fn guides(
+    chart: &mut Plane,
+    scene: &SceneReport,
+    axis: Axis,
+    (x0, x1): (f64, f64),
+    (low, high): (f64, f64),
+) -> Result<(), String> {
+    let Some(first) = scene.method(RANDOM).and_then(|m| m.curve.first()) else { return Ok(()) };
+    let start = (x_of(axis, first).log10(), (first.most.log10() + 0.06).min(high));
+    for (slope, name) in [(-0.5, "slope −1/2"), (-1.0, "slope −1")] {
+        let end_x = x1.min(start.0 + (low - start.1) / slope);
+        let at = |x: f64| (x, start.1 + slope * (x - start.0));
+        let pen = INK.mix(0.55).stroke_width(1);
+        chart.draw_series(LineSeries::new([start, at(end_x)], pen)).map_err(text)?;
+        let place = at(x0 + 0.97 * (end_x - x0));
+        let corner = Pos::new(HPos::Right, VPos::Bottom);
+        let font = (FONT, 12).into_font().color(&INK.mix(0.8)).pos(corner);
+        // Right of a falling line there is room above it, left of it below.
+        let shifted = if slope < -0.75 { (place.0 - 0.015 * (x1 - x0), place.1) } else { (place.0, place.1 + 0.02 * (high - low)) };
+        chart.draw_series([Text::new(name, shifted, font)]).map_err(text)?;
+    }
+    Ok(())
+}
+
+fn label(chart: &mut Plane, name: &str, at: (f64, f64), vertical: VPos) -> Result<(), String> {
+    let font = (FONT, 12).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Left, vertical));
+    chart.draw_series([Text::new(name.to_owned(), at, font)]).map_err(text)?;
+    Ok(())
+}
+
+/// The legend, beside the curves.
+fn keys(area: &DrawingArea<SVGBackend, Shift>, scene: &SceneReport) -> Result<(), String> {
+    let font = || (FONT, 13).into_font().color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
+    for (i, method) in (0..).zip(&scene.methods) {
+        let y = 56 + 24 * i;
+        let (color, width) = style(method);
+        let pen = color.stroke_width(width);
+        if method.ablation {
+            for x in [4, 15, 26] {
+                area.draw(&PathElement::new([(x, y), (x + 7, y)], pen)).map_err(text)?;
+            }
+        } else {
+            area.draw(&PathElement::new([(4, y), (33, y)], pen)).map_err(text)?;
+        }
+        area.draw(&Text::new(method.title, (41, y), font())).map_err(text)?;
+    }
+    let y = 56 + 24 * scene.methods.len() as i32;
+    let small = (FONT, 12).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Left, VPos::Center));
+    area.draw(&Text::new("band: best to worst seed", (4, y + 4), small)).map_err(text)?;
+    Ok(())
+}
+
+/// Where the grid of a logarithmic axis is.
+struct Ticks {
+    bold: Vec<f64>,
+    light: Vec<f64>,
+}
+
+impl Ticks {
+    /// Labels at 1, 2 and 5, on longer axes at powers of ten alone.
+    fn new(from: f64, to: f64) -> Self {
+        let labelled: &[f64] = if to - from < 2.2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let (mut bold, mut light) = (Vec::new(), Vec::new());
+        for decade in from.floor() as i32..=to.ceil() as i32 {
+            for digit in 1..10 {
+                let place = f64::from(decade) + f64::from(digit).log10();
+                if (from..=to).contains(&place) {
+                    let bold_one = labelled.contains(&f64::from(digit));
+                    if bold_one { &mut bold } else { &mut light }.push(place);
+                }
+            }
+        }
+        Self { bold, light }
+    }
+
+    fn range(&self, from: f64, to: f64) -> WithKeyPoints<RangedCoordf64> {
+        (from..to).with_key_points(self.bold.clone()).with_light_points(self.light.clone())
+    }
+}
+
+/// A tick at the logarithm `v`, as people write the number.
+fn tick(v: f64) -> String {
+    let number = 10f64.powf(v);
+    let exponent = v.floor() as i32;
+    match exponent {
+        0..=4 => format!("{number:.0}"),
+        -3..0 => format!("{number:.*}", -exponent as usize),
+        _ => format!("{number:.0e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        let ticks = Ticks::new(-2.1, -0.6);
+        let labels: Vec<String> = ticks.bold.iter().map(|&v| tick(v + 1e-12)).collect();
+        assert_eq!(labels, ["0.01", "0.02", "0.05", "0.1", "0.2"]);
+        assert!(ticks.light.len() > 5);
+        assert_eq!(tick(3.0), "1000");
+        assert_eq!(tick(-5.0), "1e-5");
+    }
+}
