@@ -338,7 +338,8 @@ fn slopes(report: &Report) -> String {
         for method in &scene.methods {
             let slope = method.slope.map_or("—".to_owned(), |fit| format!("{:+.3}", fit.slope));
             let error = method.curve.last().map_or(0.0, |point| point.rmse);
-            lines += &format!("{:<16} {:<18} slope {slope}, last RMSE {error:.2e}\n", scene.name, method.title);
+            lines +=
+                &format!("{:<16} {:<18} slope {slope}, last RMSE {error:.2e}\n", scene.name, method.title);
         }
     }
     lines

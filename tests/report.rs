@@ -116,7 +116,8 @@ fn a_quick_report_has_all_files_and_its_figures_make_sense() {
 fn a_reference_is_made_once_and_a_given_one_must_fit() {
     let folder = fresh("report-references");
     let run = |more: &[&str]| {
-        let mut arguments = vec!["cornell-point", "--resolution", "16x16", "--time", "3", "--out", "out", "-q"];
+        let mut arguments =
+            vec!["cornell-point", "--resolution", "16x16", "--time", "3", "--out", "out", "-q"];
         arguments.extend(more);
         report(&folder, &arguments)
     };

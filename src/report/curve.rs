@@ -72,9 +72,12 @@ mod tests {
     use crate::report::measure::Point;
 
     fn run(points: &[(u32, f64)]) -> Run {
-        let points = points
-            .iter()
-            .map(|&(samples, rmse)| Point { samples, seconds: f64::from(samples), rmse, noise: None });
+        let points = points.iter().map(|&(samples, rmse)| Point {
+            samples,
+            seconds: f64::from(samples),
+            rmse,
+            noise: None,
+        });
         Run { points: points.collect(), ..Run::default() }
     }
 

@@ -47,7 +47,8 @@ impl Facts {
             mesh_levels,
             largest_leaf,
             build_ms: build_ms(geometry),
-            hierarchy_bytes: geometry.tlas.hierarchy().bytes() + blas.iter().map(|b| b.bytes()).sum::<usize>(),
+            hierarchy_bytes: geometry.tlas.hierarchy().bytes()
+                + blas.iter().map(|b| b.bytes()).sum::<usize>(),
             seconds_to_first_picture,
         }
     }

@@ -14,8 +14,7 @@ pub struct ErrorScale {
 /// Decades from black to white.
 pub const DECADES: i32 = 3;
 /// Evenly spaced along the scale; each is lighter than the one before, so grey print keeps the order.
-pub const COLORS: [[u8; 3]; 5] =
-    [[0, 0, 0], [62, 22, 112], [188, 48, 84], [250, 152, 42], [255, 255, 228]];
+pub const COLORS: [[u8; 3]; 5] = [[0, 0, 0], [62, 22, 112], [188, 48, 84], [250, 152, 42], [255, 255, 228]];
 
 impl ErrorScale {
     /// A power of ten that hardly any error of these maps exceeds.
@@ -57,9 +56,7 @@ pub fn worst(errors: &[f64], size: UVec2, count: usize, apart: u32) -> Vec<UVec2
     let mut found: Vec<UVec2> = Vec::new();
     for index in order {
         let pixel = UVec2::new(index as u32 % size.x, index as u32 / size.x);
-        let far = |other: &UVec2| {
-            other.x.abs_diff(pixel.x).max(other.y.abs_diff(pixel.y)) >= apart
-        };
+        let far = |other: &UVec2| other.x.abs_diff(pixel.x).max(other.y.abs_diff(pixel.y)) >= apart;
         if found.iter().all(far) {
             found.push(pixel);
             if found.len() == count {
@@ -82,7 +79,8 @@ mod tests {
         assert_eq!((scale.color(0.1), scale.color(7.0)), (COLORS[4], COLORS[4]));
         assert_eq!(scale.color(0.1 / 10f64.powf(1.5)), COLORS[2]);
         let light = |c: [u8; 3]| 0.3 * f64::from(c[0]) + 0.59 * f64::from(c[1]) + 0.11 * f64::from(c[2]);
-        let steps: Vec<f64> = (0..=90).map(|i| light(scale.color(1e-4 * 10f64.powf(f64::from(i) / 30.0)))).collect();
+        let steps: Vec<f64> =
+            (0..=90).map(|i| light(scale.color(1e-4 * 10f64.powf(f64::from(i) / 30.0)))).collect();
         assert!(steps.windows(2).all(|w| w[0] < w[1]), "each step is lighter");
     }
 

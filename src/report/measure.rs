@@ -195,8 +195,7 @@ impl Performance {
     #[must_use]
     pub fn of(run: &Run) -> Self {
         let Some(last) = run.points.last() else { return Self::default() };
-        let noise: Vec<(f64, f64)> =
-            run.points.iter().filter_map(|p| Some((p.seconds, p.noise?))).collect();
+        let noise: Vec<(f64, f64)> = run.points.iter().filter_map(|p| Some((p.seconds, p.noise?))).collect();
         let errors: Vec<(f64, f64)> = run.points.iter().map(|p| (p.seconds, p.rmse)).collect();
         let per_second = |rays: u64| rays as f64 / last.seconds;
         Self {
@@ -224,7 +223,8 @@ mod tests {
 
     #[test]
     fn performance_is_read_between_the_points_of_a_run() {
-        let point = |samples: u32, seconds: f64, rmse: f64| Point { samples, seconds, rmse, noise: Some(rmse) };
+        let point =
+            |samples: u32, seconds: f64, rmse: f64| Point { samples, seconds, rmse, noise: Some(rmse) };
         let rays = RayCounts { camera: 64, shadow: 128, bounce: 0 };
         let run = Run { seed: 0, points: vec![point(1, 0.25, 0.08), point(16, 4.0, 0.02)], rays };
         let performance = Performance::of(&run);

@@ -7,6 +7,7 @@
 pub mod curve;
 pub mod facts;
 pub mod false_color;
+pub mod log_axis;
 pub mod machine;
 pub mod markdown;
 pub mod measure;

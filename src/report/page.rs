@@ -106,7 +106,10 @@ fn write_scene(
     }
     if let Some(crops) = &pictures.crops {
         writeln!(out, "<h3>Worst pixels of ours</h3>")?;
-        writeln!(out, "<div class=\"columns\"><span>ours</span><span>reference</span><span>error</span></div>")?;
+        writeln!(
+            out,
+            "<div class=\"columns\"><span>ours</span><span>reference</span><span>error</span></div>"
+        )?;
         let places: Vec<String> = pictures.worst.iter().map(|[x, y]| format!("{x},{y}")).collect();
         let caption = format!("From the top: around pixel {}.", places.join("; "));
         write_figure(out, crops, "sheet", &caption)?;
@@ -146,7 +149,10 @@ fn write_scale(out: &mut String, scale: &ErrorScale) -> std::fmt::Result {
     for decade in (0..=DECADES).rev() {
         write!(out, "<span>{:.0e}</span>", scale.most * 10f64.powi(-decade))?;
     }
-    writeln!(out, "</div>RMS of the three channels in linear light; logarithmic; the same for all maps above.</div>")
+    writeln!(
+        out,
+        "</div>RMS of the three channels in linear light; logarithmic; the same for all maps above.</div>"
+    )
 }
 
 fn write_table(out: &mut String, table: &Table) -> std::fmt::Result {
@@ -196,7 +202,9 @@ mod tests {
 
     #[test]
     fn base64_is_that_of_the_rfc() {
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+        for (plain, coded) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(base64(plain.as_bytes()), coded);
         }
     }

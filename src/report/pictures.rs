@@ -64,7 +64,8 @@ impl Pictures {
             let file = format!("error-{name}");
             pictures.errors.push(Shown::new(file, title(name).to_owned(), size, &colored(map)));
         }
-        let ours = kept.iter().find(|(name, _)| *name == OURS).zip(maps.iter().find(|(name, _)| *name == OURS));
+        let ours =
+            kept.iter().find(|(name, _)| *name == OURS).zip(maps.iter().find(|(name, _)| *name == OURS));
         if let Some(((_, picture), (_, map))) = ours {
             let shown = developed(picture);
             pictures.shown.push(Shown::new(OURS.to_owned(), OURS.to_owned(), size, &shown));
@@ -112,7 +113,8 @@ impl Sheet<'_> {
                     for x in 0..cell.x {
                         let from = corner + UVec2::new(x, y) / ZOOM;
                         let to = origin + UVec2::new(x, y);
-                        pixels[(to.y * size.x + to.x) as usize] = picture[(from.y * self.size.x + from.x) as usize];
+                        pixels[(to.y * size.x + to.x) as usize] =
+                            picture[(from.y * self.size.x + from.x) as usize];
                     }
                 }
             }

@@ -1,11 +1,10 @@
 //! Error curves as SVG.
 
 use super::curve::CurvePoint;
+use super::log_axis::{LogAxis, tick};
 use super::methods::{OURS, RANDOM};
 use super::{MethodReport, ReportError, SceneReport};
 use plotters::coord::Shift;
-use plotters::coord::combinators::WithKeyPoints;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -37,8 +36,7 @@ const SIZE: (u32, u32) = (780, 440);
 const LEGEND_WIDTH: u32 = 168;
 const FONT: &str = "sans-serif";
 
-type Plane<'a, 'b> =
-    ChartContext<'a, SVGBackend<'b>, Cartesian2d<WithKeyPoints<RangedCoordf64>, WithKeyPoints<RangedCoordf64>>>;
+type Plane<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogAxis, LogAxis>>;
 
 /// The curves of all methods, log-log. On white.
 ///
@@ -71,7 +69,8 @@ fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String>
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&PAPER).map_err(text)?;
     let (left, legend) = root.split_horizontally(SIZE.0 - LEGEND_WIDTH);
-    let points: Vec<&CurvePoint> = scene.methods.iter().flat_map(|m| &m.curve).filter(|p| p.least > 0.0).collect();
+    let points: Vec<&CurvePoint> =
+        scene.methods.iter().flat_map(|m| &m.curve).filter(|p| p.least > 0.0).collect();
     let xs = || points.iter().map(|p| x_of(axis, p).log10());
     let own = scene.reference.standard_error().filter(|&e| e > 0.0);
     let (x0, x1) = (xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max));
@@ -80,7 +79,8 @@ fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String>
     if !(x0 < x1 && low < high) {
         return Err(text(format!("{} has fewer than two points", scene.name)));
     }
-    let (x_ticks, y_ticks) = (Ticks::new(x0, x1), Ticks::new(low, high));
+    let (across, up) = (LogAxis::new(x0, x1), LogAxis::new(low, high));
+    let (across_labels, up_labels) = (across.labels(), up.labels());
     let over = match axis {
         Axis::Seconds => "seconds of tracing",
         Axis::Samples => "samples per pixel",
@@ -90,7 +90,7 @@ fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String>
         .caption(format!("{}: error over {over}", scene.name), (FONT, 16).into_font().color(&INK))
         .x_label_area_size(44)
         .y_label_area_size(62)
-        .build_cartesian_2d(x_ticks.range(x0, x1), y_ticks.range(low, high))
+        .build_cartesian_2d(across, up)
         .map_err(text)?;
     chart
         .configure_mesh()
@@ -101,8 +101,8 @@ fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String>
         .axis_desc_style((FONT, 14).into_font().color(&INK))
         .x_desc(over)
         .y_desc("RMSE")
-        .x_labels(x_ticks.bold.len())
-        .y_labels(y_ticks.bold.len())
+        .x_labels(across_labels)
+        .y_labels(up_labels)
         .x_label_formatter(&|v| tick(*v))
         .y_label_formatter(&|v| tick(*v))
         .draw()
@@ -177,7 +177,11 @@ fn guides(
         let corner = Pos::new(HPos::Right, VPos::Bottom);
         let font = (FONT, 12).into_font().color(&INK.mix(0.8)).pos(corner);
         // Right of a falling line there is room above it, left of it below.
-        let shifted = if slope < -0.75 { (place.0 - 0.015 * (x1 - x0), place.1) } else { (place.0, place.1 + 0.02 * (high - low)) };
+        let shifted = if slope < -0.75 {
+            (place.0 - 0.015 * (x1 - x0), place.1)
+        } else {
+            (place.0, place.1 + 0.02 * (high - low))
+        };
         chart.draw_series([Text::new(name, shifted, font)]).map_err(text)?;
     }
     Ok(())
@@ -209,58 +213,4 @@ fn keys(area: &DrawingArea<SVGBackend, Shift>, scene: &SceneReport) -> Result<()
     let small = (FONT, 12).into_font().color(&INK.mix(0.8)).pos(Pos::new(HPos::Left, VPos::Center));
     area.draw(&Text::new("band: best to worst seed", (4, y + 4), small)).map_err(text)?;
     Ok(())
-}
-
-/// Where the grid of a logarithmic axis is.
-struct Ticks {
-    bold: Vec<f64>,
-    light: Vec<f64>,
-}
-
-impl Ticks {
-    /// Labels at 1, 2 and 5, on longer axes at powers of ten alone.
-    fn new(from: f64, to: f64) -> Self {
-        let labelled: &[f64] = if to - from < 2.2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let (mut bold, mut light) = (Vec::new(), Vec::new());
-        for decade in from.floor() as i32..=to.ceil() as i32 {
-            for digit in 1..10 {
-                let place = f64::from(decade) + f64::from(digit).log10();
-                if (from..=to).contains(&place) {
-                    let bold_one = labelled.contains(&f64::from(digit));
-                    if bold_one { &mut bold } else { &mut light }.push(place);
-                }
-            }
-        }
-        Self { bold, light }
-    }
-
-    fn range(&self, from: f64, to: f64) -> WithKeyPoints<RangedCoordf64> {
-        (from..to).with_key_points(self.bold.clone()).with_light_points(self.light.clone())
-    }
-}
-
-/// A tick at the logarithm `v`, as people write the number.
-fn tick(v: f64) -> String {
-    let number = 10f64.powf(v);
-    let exponent = v.floor() as i32;
-    match exponent {
-        0..=4 => format!("{number:.0}"),
-        -3..0 => format!("{number:.*}", -exponent as usize),
-        _ => format!("{number:.0e}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_are_round_numbers() {
-        let ticks = Ticks::new(-2.1, -0.6);
-        let labels: Vec<String> = ticks.bold.iter().map(|&v| tick(v + 1e-12)).collect();
-        assert_eq!(labels, ["0.01", "0.02", "0.05", "0.1", "0.2"]);
-        assert!(ticks.light.len() > 5);
-        assert_eq!(tick(3.0), "1000");
-        assert_eq!(tick(-5.0), "1e-5");
-    }
 }

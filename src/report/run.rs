@@ -118,8 +118,7 @@ fn measure_scene(
     };
     clock.done += plan.reference;
 
-    let subject =
-        Subject { app: &app, settings, reference: &reference.picture, interrupt: &job.interrupt };
+    let subject = Subject { app: &app, settings, reference: &reference.picture, interrupt: &job.interrupt };
     let (measured, kept) = all_methods(&subject, name, plan, clock);
     let reference_error = reference.facts.standard_error();
     let methods = method_reports(measured, reference_error);

@@ -80,10 +80,9 @@ pub fn performance(report: &Report) -> Table {
         (None, _) => format!("given: {}", s.reference.file),
     });
     row("noise number / true error", &|s| {
-        s.noise_check.as_ref().map_or_else(
-            || NOTHING.to_owned(),
-            |check| format!("{:.3} ± {:.3}", check.mean, check.deviation),
-        )
+        s.noise_check
+            .as_ref()
+            .map_or_else(|| NOTHING.to_owned(), |check| format!("{:.3} ± {:.3}", check.mean, check.deviation))
     });
     table.notes.push(
         "Of our own method, from its longest run. Times are of tracing alone, but for the first picture, which \
@@ -143,7 +142,8 @@ pub fn methods(scene: &SceneReport) -> Table {
 /// A row for each scene.
 #[must_use]
 pub fn noise(report: &Report) -> Table {
-    let head = ["scene", "runs", "samples", "true error", "ratio: mean", "spread of one run", "5 % – 50 % – 95 %"];
+    let head =
+        ["scene", "runs", "samples", "true error", "ratio: mean", "spread of one run", "5 % – 50 % – 95 %"];
     let row = |scene: &SceneReport| {
         let check = scene.noise_check.as_ref()?;
         let [low, middle, high] = check.percentiles;
