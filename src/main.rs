@@ -336,8 +336,9 @@ fn slopes(report: &Report) -> String {
     let mut lines = String::new();
     for scene in &report.scenes {
         for method in &scene.methods {
-            let slope = method.slope.map_or("—".to_owned(), |fit| format!("{:+.3}", fit.slope));
-            let error = method.curve.last().map_or(0.0, |point| point.rmse);
+            let found = method.surfaces.as_ref().unwrap_or(&method.all);
+            let slope = found.slope.map_or("—".to_owned(), |fit| format!("{:+.3}", fit.slope));
+            let error = found.curve.last().map_or(0.0, |point| point.rmse);
             lines +=
                 &format!("{:<16} {:<18} slope {slope}, last RMSE {error:.2e}\n", scene.name, method.title);
         }

@@ -1,9 +1,30 @@
 //! Several runs of one method → one curve with a band.
 
 use super::measure::Run;
-use super::statistics::{Fit, fit_power};
+use super::statistics::{Fit, first_below, fit_power};
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// Which pixels an error is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// All of them.
+    All,
+    /// Those that see no light directly: a lamp's bright outline has so much contrast that it hides what
+    /// happens in its penumbra.
+    Surfaces,
+}
+
+/// A method by one measure.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Findings {
+    /// All seeds together.
+    pub curve: Vec<CurvePoint>,
+    /// The slope of log error over log samples.
+    pub slope: Option<Fit>,
+    /// Seconds until the error that plain random sampling has at the end of its own curve.
+    pub seconds_to_random_error: Option<f64>,
+}
 
 /// All runs at one sample count.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -22,6 +43,14 @@ pub struct CurvePoint {
     pub runs: usize,
 }
 
+impl Findings {
+    /// Notes when the error is at `level` for the first time.
+    pub fn race_to(&mut self, level: Option<f64>) {
+        let points: Vec<(f64, f64)> = self.curve.iter().map(|p| (p.seconds, p.rmse)).collect();
+        self.seconds_to_random_error = level.and_then(|level| first_below(&points, level));
+    }
+}
+
 /// Where a fit begins: before, the error still depends on where the samples happen to lie.
 const FIT_FROM: u32 = 4;
 /// An error is taken as measured if it is so many times the reference's own.
@@ -29,10 +58,12 @@ pub const TRUSTED: f64 = 4.0;
 
 /// One point for each sample count that several runs have; where just one goes on, also those.
 #[must_use]
-pub fn curve(runs: &[Run]) -> Vec<CurvePoint> {
+pub fn curve(runs: &[Run], measure: Measure) -> Vec<CurvePoint> {
     let mut by_samples: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
     for point in runs.iter().flat_map(|run| &run.points) {
-        by_samples.entry(point.samples).or_default().push((point.seconds, point.rmse));
+        if let Some(error) = point.error(measure) {
+            by_samples.entry(point.samples).or_default().push((point.seconds, error));
+        }
     }
     // Runs that end by time end anywhere: such a point of one run would stand out among means of all.
     let shared = by_samples.iter().filter(|(_, runs)| runs.len() > 1).map(|(&n, _)| n).max().unwrap_or(0);
@@ -84,7 +115,8 @@ mod tests {
     #[test]
     fn a_run_that_ends_between_does_not_dent_the_curve() {
         let runs = [run(&[(1, 3.0), (2, 2.0), (4, 1.0)]), run(&[(1, 4.0), (2, 2.0), (3, 9.0)])];
-        let curve = curve(&runs);
+        assert!(curve(&runs, Measure::Surfaces).is_empty());
+        let curve = curve(&runs, Measure::All);
         assert_eq!(curve.iter().map(|p| p.samples).collect::<Vec<_>>(), [1, 2, 4]);
         assert!((curve[0].rmse - 12.5f64.sqrt()).abs() < 1e-12);
         assert_eq!((curve[0].least, curve[0].most, curve[0].runs), (3.0, 4.0, 2));
@@ -93,7 +125,7 @@ mod tests {
     #[test]
     fn errors_as_small_as_the_reference_s_are_not_fitted() {
         let all: Vec<(u32, f64)> = (0..8).map(|i| (1 << i, 0.5f64.powi(i))).collect();
-        let curve = curve(&[run(&all)]);
+        let curve = curve(&[run(&all)], Measure::All);
         assert_eq!(slope(&curve, None).unwrap().points, 6);
         assert_eq!(slope(&curve, Some(0.5f64.powi(7))).unwrap().points, 4);
         assert_eq!(slope(&curve, Some(0.1)), None);

@@ -19,8 +19,8 @@ pub const COLORS: [[u8; 3]; 5] = [[0, 0, 0], [62, 22, 112], [188, 48, 84], [250,
 impl ErrorScale {
     /// A power of ten that hardly any error of these maps exceeds.
     #[must_use]
-    pub fn of(maps: &[&[f64]]) -> Self {
-        let all: Vec<f64> = maps.iter().flat_map(|map| map.iter().copied()).collect();
+    pub fn of(maps: &[Vec<f64>]) -> Self {
+        let all = maps.concat();
         let high = percentile(&all, 0.999).filter(|&e| e > 0.0).unwrap_or(1.0);
         Self { most: 10f64.powi(high.log10().ceil() as i32) }
     }
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn the_scale_is_logarithmic_and_ends_in_black_and_white() {
-        let scale = ErrorScale::of(&[&[0.0, 0.03, 0.04]]);
+        let scale = ErrorScale::of(&[vec![0.0, 0.03], vec![0.04]]);
         assert!((scale.most - 0.1).abs() < 1e-12);
         assert_eq!((scale.color(0.0), scale.color(1e-9)), (COLORS[0], COLORS[0]));
         assert_eq!((scale.color(0.1), scale.color(7.0)), (COLORS[4], COLORS[4]));

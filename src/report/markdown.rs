@@ -1,6 +1,9 @@
 //! The findings as Markdown.
 
+use super::curve::Measure;
+use super::plot::Axis;
 use super::tables::{self, Table};
+use super::write::plot_name;
 use super::{Report, ReportError, SceneReport};
 use std::fmt::Write;
 
@@ -36,9 +39,15 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
 fn write_scene(out: &mut String, scene: &SceneReport) -> std::fmt::Result {
     let name = &scene.name;
     writeln!(out, "## {name}\n")?;
-    writeln!(out, "![error over seconds]({name}-seconds.svg)\n")?;
-    writeln!(out, "![error over samples]({name}-samples.svg)\n")?;
-    write_table(out, &tables::methods(scene))?;
+    for measure in scene.measures() {
+        if measure == Measure::Surfaces {
+            writeln!(out, "### Where no light is seen\n")?;
+        }
+        for axis in [Axis::Seconds, Axis::Samples] {
+            writeln!(out, "![error curves]({})\n", plot_name(name, axis, measure))?;
+        }
+        write_table(out, &tables::methods(scene, measure))?;
+    }
     let pictures = &scene.pictures;
     for shown in pictures.shown.iter().chain(&pictures.errors).chain(&pictures.crops) {
         writeln!(out, "![{}]({name}-{}.png)", shown.title, shown.name)?;

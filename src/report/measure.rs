@@ -1,5 +1,6 @@
 //! One run of one method: samples in growing steps, and after each how wrong the picture is.
 
+use super::curve::Measure;
 use super::methods::Method;
 use super::statistics::{first_below, value_at};
 use crate::app::App;
@@ -9,6 +10,7 @@ use crate::trace::noise::relative_noise;
 use crate::trace::{
     Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
 };
+use glam::Vec3;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,8 +24,21 @@ pub struct Point {
     pub seconds: f64,
     /// Root of the mean over pixels and channels of the squared linear difference to the reference.
     pub rmse: f64,
+    /// The same without the pixels that see a light, if there are such.
+    pub rmse_surfaces: Option<f64>,
     /// What the program says of itself, from two samples on.
     pub noise: Option<f64>,
+}
+
+impl Point {
+    /// By one measure.
+    #[must_use]
+    pub fn error(&self, measure: Measure) -> Option<f64> {
+        match measure {
+            Measure::All => Some(self.rmse),
+            Measure::Surfaces => self.rmse_surfaces,
+        }
+    }
 }
 
 /// One run.
@@ -52,6 +67,8 @@ pub struct Performance {
     pub seconds_to_noise: [Option<f64>; 3],
     /// RMSE after 1, 5 and 30 seconds of tracing.
     pub rmse_after: [Option<f64>; 3],
+    /// The same without the pixels that see a light.
+    pub rmse_surfaces_after: [Option<f64>; 3],
 }
 
 /// Noise numbers that a picture is waited for.
@@ -125,10 +142,31 @@ pub fn checkpoints() -> impl Iterator<Item = u32> {
     (0..31).flat_map(|i| [Some(1 << i), (i > 0).then(|| (1 << i) + (1 << (i - 1)))]).flatten()
 }
 
-/// The error of a film.
+/// Which pixels see no light, rows from the top; `None` if none does, or all.
 #[must_use]
-pub fn rmse(film: &Film, reference: &LinearImage) -> f64 {
-    Difference::between(&picture(film), reference).rmse
+pub fn surfaces(app: &App, settings: &RenderSettings) -> Option<Vec<bool>> {
+    // Without any bounce only what shines is seen.
+    let settings = RenderSettings { max_depth: 0, ..*settings };
+    let mut film = Film::new(settings.size, 0);
+    trace_pass(&traceable(app, &settings), &mut film, MASK_SAMPLES, MASK_SAMPLES, || true);
+    let dark: Vec<bool> = linear_pixels(&film).into_iter().map(|p| p == Vec3::ZERO).collect();
+    (dark.contains(&true) && dark.contains(&false)).then_some(dark)
+}
+
+/// Samples that look for lights: one that so many miss covers little of its pixel.
+const MASK_SAMPLES: u32 = 64;
+
+/// Root of the mean over pixels and channels of the squared difference; also over the pixels of a mask.
+#[must_use]
+pub fn rmse(picture: &LinearImage, reference: &LinearImage, mask: Option<&[bool]>) -> (f64, Option<f64>) {
+    let masked = mask.map(|mask| {
+        let only = |image: &LinearImage| {
+            let pixels = image.pixels.iter().zip(mask).filter(|(_, inside)| **inside);
+            LinearImage { size: image.size, pixels: pixels.map(|(pixel, _)| *pixel).collect() }
+        };
+        Difference::between(&only(picture), &only(reference)).rmse
+    });
+    (Difference::between(picture, reference).rmse, masked)
 }
 
 /// A film's means.
@@ -145,6 +183,8 @@ pub struct Subject<'a> {
     pub settings: RenderSettings,
     /// What it should look like.
     pub reference: &'a LinearImage,
+    /// See [`surfaces`].
+    pub surfaces: Option<&'a [bool]>,
     /// Raised from outside to stop.
     pub interrupt: &'a AtomicBool,
 }
@@ -172,10 +212,13 @@ pub fn run(
         }
         let samples = tracing.samples();
         if run.points.last().is_none_or(|last| last.samples < samples) {
+            let picture = picture(&tracing.film);
+            let (rmse, rmse_surfaces) = rmse(&picture, subject.reference, subject.surfaces);
             run.points.push(Point {
                 samples,
                 seconds: tracing.seconds,
-                rmse: rmse(&tracing.film, subject.reference),
+                rmse,
+                rmse_surfaces,
                 noise: relative_noise(&tracing.film),
             });
             run.rays = tracing.rays;
@@ -196,7 +239,11 @@ impl Performance {
     pub fn of(run: &Run) -> Self {
         let Some(last) = run.points.last() else { return Self::default() };
         let noise: Vec<(f64, f64)> = run.points.iter().filter_map(|p| Some((p.seconds, p.noise?))).collect();
-        let errors: Vec<(f64, f64)> = run.points.iter().map(|p| (p.seconds, p.rmse)).collect();
+        let after = |measure: Measure| {
+            let errors = run.points.iter().filter_map(|p| Some((p.seconds, p.error(measure)?)));
+            let errors: Vec<(f64, f64)> = errors.collect();
+            MOMENTS.map(|seconds| value_at(&errors, seconds))
+        };
         let per_second = |rays: u64| rays as f64 / last.seconds;
         Self {
             samples_per_second: f64::from(last.samples) / last.seconds,
@@ -204,7 +251,8 @@ impl Performance {
             shadow_rays_per_second: per_second(run.rays.shadow),
             bounce_rays_per_second: per_second(run.rays.bounce),
             seconds_to_noise: NOISE_LEVELS.map(|level| first_below(&noise, level)),
-            rmse_after: MOMENTS.map(|seconds| value_at(&errors, seconds)),
+            rmse_after: after(Measure::All),
+            rmse_surfaces_after: after(Measure::Surfaces),
         }
     }
 }
@@ -223,8 +271,13 @@ mod tests {
 
     #[test]
     fn performance_is_read_between_the_points_of_a_run() {
-        let point =
-            |samples: u32, seconds: f64, rmse: f64| Point { samples, seconds, rmse, noise: Some(rmse) };
+        let point = |samples: u32, seconds: f64, rmse: f64| Point {
+            samples,
+            seconds,
+            rmse,
+            rmse_surfaces: None,
+            noise: Some(rmse),
+        };
         let rays = RayCounts { camera: 64, shadow: 128, bounce: 0 };
         let run = Run { seed: 0, points: vec![point(1, 0.25, 0.08), point(16, 4.0, 0.02)], rays };
         let performance = Performance::of(&run);
@@ -234,5 +287,17 @@ mod tests {
         assert!((one.unwrap() - 0.04).abs() < 1e-12 && five.is_none() && thirty.is_none());
         let [five, two, one] = performance.seconds_to_noise;
         assert!((five.unwrap() - 0.64).abs() < 1e-9 && two == Some(4.0) && one.is_none());
+    }
+
+    #[test]
+    fn a_mask_leaves_pixels_out() {
+        let image = |values: [f32; 4]| LinearImage {
+            size: glam::UVec2::new(4, 1),
+            pixels: values.map(Vec3::splat).to_vec(),
+        };
+        let (a, b) = (image([1.0, 2.0, 3.0, 9.0]), image([1.0, 2.0, 3.5, 5.0]));
+        let (all, masked) = rmse(&a, &b, Some(&[true, true, true, false]));
+        assert!((all - (16.25f64 / 4.0).sqrt()).abs() < 1e-6);
+        assert!((masked.unwrap() - (0.25f64 / 3.0).sqrt()).abs() < 1e-6);
     }
 }

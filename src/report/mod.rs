@@ -166,15 +166,31 @@ pub struct MethodReport {
     pub ablation: bool,
     /// Each seed's measurements.
     pub runs: Vec<measure::Run>,
-    /// All seeds together.
-    pub curve: Vec<curve::CurvePoint>,
-    /// The slope of log error over log samples.
-    pub slope: Option<statistics::Fit>,
-    /// Seconds until the error that plain random sampling has at the end of its own curve.
-    pub seconds_to_random_error: Option<f64>,
+    /// Over all pixels.
+    pub all: curve::Findings,
+    /// Without the pixels that see a light, if there are such.
+    pub surfaces: Option<curve::Findings>,
+}
+
+impl MethodReport {
+    /// By one measure.
+    #[must_use]
+    pub fn findings(&self, measure: curve::Measure) -> Option<&curve::Findings> {
+        match measure {
+            curve::Measure::All => Some(&self.all),
+            curve::Measure::Surfaces => self.surfaces.as_ref(),
+        }
+    }
 }
 
 impl SceneReport {
+    /// The measures that there are findings by.
+    #[must_use]
+    pub fn measures(&self) -> Vec<curve::Measure> {
+        let surfaces = self.methods.iter().any(|m| m.surfaces.is_some());
+        if surfaces { vec![curve::Measure::All, curve::Measure::Surfaces] } else { vec![curve::Measure::All] }
+    }
+
     /// The method of that name, if it got that far.
     #[must_use]
     pub fn method(&self, name: &str) -> Option<&MethodReport> {

@@ -25,6 +25,11 @@ pub struct NoiseCheck {
     pub deviation: f64,
     /// 5th, 50th and 95th percentile.
     pub percentiles: [f64; 3],
+    /// Mean of the ratios to the error relative to the picture's own brightness, as the noise number has it,
+    /// in place of the reference's.
+    pub mean_alike: f64,
+    /// Standard error of that.
+    pub mean_alike_error: f64,
     /// Root mean square of the true relative errors.
     pub true_error: f64,
     /// Each run's ratio.
@@ -38,25 +43,25 @@ const FIRST_SEED: u32 = 1000;
 /// Samples per pixel of a run, at least and at most.
 const SAMPLES: (f64, f64) = (2.0, 64.0);
 
-/// Relative error of the picture's luminance, in the measure of [`relative_noise`], but with the reference's
-/// own brightness in the denominator: the picture's would be a part of what is judged.
+/// Relative error of the picture's luminance in the measure of [`relative_noise`]; `weights` is the picture
+/// whose brightness errors are relative to.
 #[must_use]
-pub fn relative_error(film: &Film, reference: &LinearImage) -> Option<f64> {
-    let shown: Vec<f64> = (0..film.size().y)
-        .flat_map(|y| film.row(y))
-        .map(|pixel| f64::from(luminance(pixel.mean().as_vec3())))
-        .collect();
-    let truth: Vec<f64> = reference.pixels.iter().map(|&p| f64::from(luminance(p))).collect();
-    let mut lit: Vec<f64> = truth.iter().copied().filter(|&i| i > 0.0).collect();
+pub fn relative_error(shown: &[f64], truth: &[f64], weights: &[f64]) -> Option<f64> {
+    let mut lit: Vec<f64> = weights.iter().copied().filter(|&i| i > 0.0).collect();
     if lit.is_empty() {
         return None;
     }
     let middle = lit.len() / 2;
     let median = *lit.select_nth_unstable_by(middle, f64::total_cmp).1;
     let floor = (0.1 * median).powi(2);
-    let square = |(&i, &t): (&f64, &f64)| (i - t).powi(2) / (t * t + floor);
-    let sum: f64 = shown.iter().zip(&truth).map(square).sum();
+    let square = |((i, t), w): ((&f64, &f64), &f64)| (i - t).powi(2) / (w * w + floor);
+    let sum: f64 = shown.iter().zip(truth).zip(weights).map(square).sum();
     Some((sum / truth.len() as f64).sqrt())
+}
+
+fn brightness(film: &Film) -> Vec<f64> {
+    let pixels = (0..film.size().y).flat_map(|y| film.row(y));
+    pixels.map(|pixel| f64::from(luminance(pixel.mean().as_vec3()))).collect()
 }
 
 /// Makes the runs, so that they take `seconds` in all; fewer if interrupted, `None` if hardly any.
@@ -71,32 +76,46 @@ pub fn check(
     let affordable = seconds * samples_per_second / f64::from(RUNS);
     // A power of two, as the sequences are made for; NaN becomes the least.
     let samples = affordable.clamp(SAMPLES.0, SAMPLES.1).log2().floor().exp2().max(SAMPLES.0) as u32;
-    let (mut ratios, mut errors, mut spent) = (Vec::new(), Vec::new(), 0.0);
+    let truth: Vec<f64> = reference.pixels.iter().map(|&p| f64::from(luminance(p))).collect();
+    let (mut found, mut spent) = (Found::default(), 0.0);
     for run in 0..RUNS {
         let settings = RenderSettings { seed: FIRST_SEED + run, ..*settings };
         let mut tracing = Tracing::new(traceable(app, &settings), interrupt);
         while tracing.samples() < samples {
             if !tracing.pass(samples) {
-                return NoiseCheck::of(samples, &ratios, &errors);
+                return NoiseCheck::of(samples, found);
             }
         }
         spent += tracing.seconds;
         progress(spent);
-        let error = relative_error(&tracing.film, reference).filter(|&error| error > 0.0);
-        if let Some((noise, error)) = relative_noise(&tracing.film).zip(error) {
-            ratios.push(noise / error);
-            errors.push(error);
+        let shown = brightness(&tracing.film);
+        let error = relative_error(&shown, &truth, &truth).filter(|&error| error > 0.0);
+        let alike = relative_error(&shown, &truth, &shown).filter(|&error| error > 0.0);
+        if let (Some(noise), Some(error), Some(alike)) = (relative_noise(&tracing.film), error, alike) {
+            found.ratios.push(noise / error);
+            found.alike.push(noise / alike);
+            found.errors.push(error);
         }
     }
-    NoiseCheck::of(samples, &ratios, &errors)
+    NoiseCheck::of(samples, found)
+}
+
+/// What the runs gave.
+#[derive(Default)]
+struct Found {
+    ratios: Vec<f64>,
+    alike: Vec<f64>,
+    errors: Vec<f64>,
 }
 
 impl NoiseCheck {
-    fn of(samples: u32, ratios: &[f64], errors: &[f64]) -> Option<Self> {
+    fn of(samples: u32, found: Found) -> Option<Self> {
+        let Found { ratios, alike, errors } = found;
         if ratios.len() < 2 {
             return None;
         }
-        let (mean, deviation) = mean_and_deviation(ratios);
+        let (mean, deviation) = mean_and_deviation(&ratios);
+        let (mean_alike, deviation_alike) = mean_and_deviation(&alike);
         let square: f64 = errors.iter().map(|e| e * e).sum();
         Some(Self {
             runs: ratios.len(),
@@ -104,9 +123,11 @@ impl NoiseCheck {
             mean,
             mean_error: deviation / (ratios.len() as f64).sqrt(),
             deviation,
-            percentiles: [0.05, 0.5, 0.95].map(|part| percentile(ratios, part).unwrap_or(f64::NAN)),
+            percentiles: [0.05, 0.5, 0.95].map(|part| percentile(&ratios, part).unwrap_or(f64::NAN)),
             true_error: (square / errors.len() as f64).sqrt(),
-            ratios: ratios.to_vec(),
+            mean_alike,
+            mean_alike_error: deviation_alike / (alike.len() as f64).sqrt(),
+            ratios,
         })
     }
 }
@@ -114,18 +135,13 @@ impl NoiseCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{UVec2, Vec3};
 
     #[test]
     fn the_true_error_of_a_picture_that_is_off_everywhere() {
-        let mut film = Film::new(UVec2::new(4, 4), 0);
-        for pixel in film.tiles_mut()[0].pixels_mut() {
-            pixel.add(0, Vec3::splat(1.5));
-        }
-        let reference = LinearImage { size: UVec2::new(4, 4), pixels: vec![Vec3::ONE; 16] };
-        let error = relative_error(&film, &reference).unwrap();
-        assert!((error - 0.5 / 1.01f64.sqrt()).abs() < 1e-6, "{error}");
-        let black = LinearImage { size: UVec2::new(4, 4), pixels: vec![Vec3::ZERO; 16] };
-        assert_eq!(relative_error(&film, &black), None, "nothing to be relative to");
+        let error = relative_error(&[1.5; 16], &[1.0; 16], &[1.0; 16]).unwrap();
+        assert!((error - 0.5 / 1.01f64.sqrt()).abs() < 1e-12, "{error}");
+        let own = relative_error(&[1.5; 16], &[1.0; 16], &[1.5; 16]).unwrap();
+        assert!((own * 1.5 - error).abs() < 1e-12);
+        assert_eq!(relative_error(&[1.0; 16], &[0.0; 16], &[0.0; 16]), None, "nothing to be relative to");
     }
 }

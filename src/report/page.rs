@@ -1,5 +1,6 @@
 //! The findings as one page that needs nothing else: no network, no other file.
 
+use super::curve::Measure;
 use super::false_color::{COLORS, DECADES, ErrorScale};
 use super::measure::PICTURE_SAMPLES;
 use super::pictures::Shown;
@@ -37,23 +38,14 @@ figure.sheet{max-width:34rem}figcaption{font-size:.875rem;color:var(--soft);marg
 /// `index.html`.
 ///
 /// # Errors
-/// If the curves cannot be drawn.
+/// Never: writing to memory. In place of a curve that cannot be drawn stands why.
 pub fn page(report: &Report) -> Result<String, ReportError> {
     let mut out = String::new();
-    let plots: Vec<[Result<String, ReportError>; 2]> = report
-        .scenes
-        .iter()
-        .map(|scene| [Axis::Seconds, Axis::Samples].map(|axis| curves(scene, axis)))
-        .collect();
-    write_page(&mut out, report, &plots).map_err(|error| ReportError::Plot(error.to_string()))?;
+    write_page(&mut out, report).map_err(|error| ReportError::Plot(error.to_string()))?;
     Ok(out)
 }
 
-fn write_page(
-    out: &mut String,
-    report: &Report,
-    plots: &[[Result<String, ReportError>; 2]],
-) -> std::fmt::Result {
+fn write_page(out: &mut String, report: &Report) -> std::fmt::Result {
     let machine = &report.machine;
     let title = format!("Penumbra {}: speed and error", report.version);
     write!(
@@ -72,28 +64,33 @@ fn write_page(
     }
     writeln!(out, "<h2>Performance</h2>")?;
     write_table(out, &tables::performance(report))?;
-    for (scene, plots) in report.scenes.iter().zip(plots) {
-        write_scene(out, scene, plots)?;
+    for scene in &report.scenes {
+        write_scene(out, scene)?;
     }
     writeln!(out, "<h2>Is the noise number right?</h2>")?;
     write_table(out, &tables::noise(report))?;
     writeln!(out, "</body></html>")
 }
 
-fn write_scene(
-    out: &mut String,
-    scene: &SceneReport,
-    plots: &[Result<String, ReportError>; 2],
-) -> std::fmt::Result {
+fn write_scene(out: &mut String, scene: &SceneReport) -> std::fmt::Result {
     writeln!(out, "<h2>{}</h2>", escape(&scene.name))?;
-    for plot in plots {
-        match plot {
-            Ok(svg) => writeln!(out, "<div class=\"plot\">{}</div>", for_page(svg))?,
-            Err(why) => writeln!(out, "<p class=\"warning\">{}</p>", escape(&why.to_string()))?,
+    for measure in scene.measures() {
+        if measure == Measure::Surfaces {
+            writeln!(out, "<h3>Where no light is seen</h3>")?;
+            writeln!(
+                out,
+                "<p class=\"soft\">The same pictures without the pixels that see a light directly: its bright \
+                 outline hides what happens in the penumbra.</p>"
+            )?;
         }
+        for axis in [Axis::Seconds, Axis::Samples] {
+            match curves(scene, axis, measure) {
+                Ok(svg) => writeln!(out, "<div class=\"plot\">{}</div>", for_page(&svg))?,
+                Err(why) => writeln!(out, "<p class=\"warning\">{}</p>", escape(&why.to_string()))?,
+            }
+        }
+        write_table(out, &tables::methods(scene, measure))?;
     }
-    writeln!(out, "<h3>Methods</h3>")?;
-    write_table(out, &tables::methods(scene))?;
     let pictures = &scene.pictures;
     writeln!(out, "<h3>Ours after {PICTURE_SAMPLES} samples per pixel, and the reference</h3>")?;
     write_row(out, &pictures.shown)?;
@@ -105,7 +102,8 @@ fn write_scene(
         }
     }
     if let Some(crops) = &pictures.crops {
-        writeln!(out, "<h3>Worst pixels of ours</h3>")?;
+        let of = if scene.measures().len() > 1 { ", where no light is seen" } else { "" };
+        writeln!(out, "<h3>Worst pixels of ours{of}</h3>")?;
         writeln!(
             out,
             "<div class=\"columns\"><span>ours</span><span>reference</span><span>error</span></div>"

@@ -46,9 +46,14 @@ const GAP: u32 = 8;
 const GAP_COLOR: [u8; 3] = [128, 128, 128];
 
 impl Pictures {
-    /// From the pictures that methods made, by name, and the reference.
+    /// From the pictures that methods made, by name, and the reference. Scale and places are chosen by the
+    /// pixels of the mask alone, if there is one.
     #[must_use]
-    pub fn new(kept: &[(&'static str, LinearImage)], reference: &LinearImage, display: &Display) -> Self {
+    pub fn new(
+        kept: &[(&'static str, LinearImage)],
+        (reference, surfaces): (&LinearImage, Option<&[bool]>),
+        display: &Display,
+    ) -> Self {
         let size = reference.size;
         let developed = |picture: &LinearImage| -> Vec<[u8; 3]> {
             picture.pixels.iter().map(|&p| develop(p, display)).collect()
@@ -56,7 +61,10 @@ impl Pictures {
         let truth = developed(reference);
         let maps: Vec<(&'static str, Vec<f64>)> =
             kept.iter().map(|(name, picture)| (*name, errors(picture, reference))).collect();
-        let scale = ErrorScale::of(&maps.iter().map(|(_, map)| map.as_slice()).collect::<Vec<_>>());
+        let inside = |map: &Vec<f64>| -> Vec<f64> {
+            (0..).zip(map).map(|(i, &e)| if surfaces.is_none_or(|s| s[i]) { e } else { 0.0 }).collect()
+        };
+        let scale = ErrorScale::of(&maps.iter().map(|(_, map)| inside(map)).collect::<Vec<_>>());
         let colored = |map: &[f64]| -> Vec<[u8; 3]> { map.iter().map(|&e| scale.color(e)).collect() };
         let title = |name: &str| METHODS.iter().find(|m| m.name == name).map_or("", |m| m.title);
         let mut pictures = Self { scale: Some(scale), ..Self::default() };
@@ -69,7 +77,7 @@ impl Pictures {
         if let Some(((_, picture), (_, map))) = ours {
             let shown = developed(picture);
             pictures.shown.push(Shown::new(OURS.to_owned(), OURS.to_owned(), size, &shown));
-            let places = worst(map, size, PLACES, SIDE);
+            let places = worst(&inside(map), size, PLACES, SIDE);
             pictures.worst = places.iter().map(|p| p.to_array()).collect();
             let sheet = Sheet { size, places: &places, columns: [&shown, &truth, &colored(map)] };
             pictures.crops = (!places.is_empty()).then(|| sheet.draw());

@@ -1,6 +1,6 @@
 //! Error curves as SVG.
 
-use super::curve::CurvePoint;
+use super::curve::{CurvePoint, Findings, Measure};
 use super::log_axis::{LogAxis, tick};
 use super::methods::{OURS, RANDOM};
 use super::{MethodReport, ReportError, SceneReport};
@@ -42,9 +42,9 @@ type Plane<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogAxis, LogAx
 ///
 /// # Errors
 /// If it cannot be drawn.
-pub fn curves(scene: &SceneReport, axis: Axis) -> Result<String, ReportError> {
+pub fn curves(scene: &SceneReport, axis: Axis, measure: Measure) -> Result<String, ReportError> {
     let mut svg = String::new();
-    draw(&mut svg, scene, axis).map_err(ReportError::Plot)?;
+    draw(&mut svg, scene, axis, measure).map_err(ReportError::Plot)?;
     Ok(svg)
 }
 
@@ -65,14 +65,18 @@ fn text<E: std::fmt::Display>(error: E) -> String {
     format!("the curves cannot be drawn: {error}")
 }
 
-fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String> {
+fn draw(svg: &mut String, scene: &SceneReport, axis: Axis, measure: Measure) -> Result<(), String> {
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&PAPER).map_err(text)?;
     let (left, legend) = root.split_horizontally(SIZE.0 - LEGEND_WIDTH);
+    // Ours last, on top.
+    let mut lines: Vec<(&MethodReport, &Findings)> =
+        scene.methods.iter().filter_map(|method| Some((method, method.findings(measure)?))).collect();
+    lines.sort_by_key(|(method, _)| method.name == OURS);
     let points: Vec<&CurvePoint> =
-        scene.methods.iter().flat_map(|m| &m.curve).filter(|p| p.least > 0.0).collect();
+        lines.iter().flat_map(|(_, found)| &found.curve).filter(|p| p.least > 0.0).collect();
     let xs = || points.iter().map(|p| x_of(axis, p).log10());
-    let own = scene.reference.standard_error().filter(|&e| e > 0.0);
+    let own = scene.reference.standard_error(measure).filter(|&e| e > 0.0);
     let (x0, x1) = (xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max));
     let low = points.iter().map(|p| p.least).chain(own).fold(f64::INFINITY, f64::min).log10() - 0.1;
     let high = points.iter().map(|p| p.most).fold(0.0, f64::max).log10() + 0.12;
@@ -85,9 +89,13 @@ fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String>
         Axis::Seconds => "seconds of tracing",
         Axis::Samples => "samples per pixel",
     };
+    let title = match measure {
+        Measure::All => format!("{}: error over {over}", scene.name),
+        Measure::Surfaces => format!("{}: error over {over}, where no light is seen", scene.name),
+    };
     let mut chart = ChartBuilder::on(&left)
         .margin(12)
-        .caption(format!("{}: error over {over}", scene.name), (FONT, 16).into_font().color(&INK))
+        .caption(title, (FONT, 16).into_font().color(&INK))
         .x_label_area_size(44)
         .y_label_area_size(62)
         .build_cartesian_2d(across, up)
@@ -107,20 +115,19 @@ fn draw(svg: &mut String, scene: &SceneReport, axis: Axis) -> Result<(), String>
         .y_label_formatter(&|v| tick(*v))
         .draw()
         .map_err(text)?;
-    guides(&mut chart, scene, axis, (x0, x1), (low, high))?;
+    if let Some((_, random)) = lines.iter().find(|(method, _)| method.name == RANDOM) {
+        guides(&mut chart, random, axis, (x0, x1), (low, high))?;
+    }
     if let Some(own) = own.map(f64::log10) {
         let floor = DashedLineSeries::new([(x0, own), (x1, own)], 2, 4, INK.mix(0.7).stroke_width(1));
         chart.draw_series(floor).map_err(text)?;
         label(&mut chart, "the reference's own error", (x0 + 0.02 * (x1 - x0), own), VPos::Bottom)?;
     }
-    // Ours last, on top.
-    let mut methods: Vec<&MethodReport> = scene.methods.iter().collect();
-    methods.sort_by_key(|method| method.name == OURS);
-    for method in &methods {
-        band(&mut chart, method, axis)?;
+    for (method, found) in &lines {
+        band(&mut chart, style(method).0, found, axis)?;
     }
-    for method in &methods {
-        line(&mut chart, method, axis)?;
+    for (method, found) in &lines {
+        line(&mut chart, method, found, axis)?;
     }
     keys(&legend, scene)?;
     root.present().map_err(text)
@@ -131,18 +138,17 @@ fn style(method: &MethodReport) -> (RGBColor, u32) {
     (color, if method.name == OURS { 3 } else { 2 })
 }
 
-fn band(chart: &mut Plane, method: &MethodReport, axis: Axis) -> Result<(), String> {
-    let shared = || method.curve.iter().filter(|p| p.runs > 1 && p.least > 0.0);
+fn band(chart: &mut Plane, color: RGBColor, found: &Findings, axis: Axis) -> Result<(), String> {
+    let shared = || found.curve.iter().filter(|p| p.runs > 1 && p.least > 0.0);
     let upper = shared().map(|p| (x_of(axis, p).log10(), p.most.log10()));
     let lower = shared().rev().map(|p| (x_of(axis, p).log10(), p.least.log10()));
     let outline: Vec<(f64, f64)> = upper.chain(lower).collect();
-    let (color, _) = style(method);
     chart.draw_series([Polygon::new(outline, color.mix(0.2))]).map_err(text)?;
     Ok(())
 }
 
-fn line(chart: &mut Plane, method: &MethodReport, axis: Axis) -> Result<(), String> {
-    let points: Vec<(f64, f64)> = method
+fn line(chart: &mut Plane, method: &MethodReport, found: &Findings, axis: Axis) -> Result<(), String> {
+    let points: Vec<(f64, f64)> = found
         .curve
         .iter()
         .filter(|p| p.rmse > 0.0)
@@ -161,27 +167,23 @@ fn line(chart: &mut Plane, method: &MethodReport, axis: Axis) -> Result<(), Stri
 /// Lines of slope −1/2 and −1 from above the first point of plain random sampling.
 fn guides(
     chart: &mut Plane,
-    scene: &SceneReport,
+    random: &Findings,
     axis: Axis,
     (x0, x1): (f64, f64),
     (low, high): (f64, f64),
 ) -> Result<(), String> {
-    let Some(first) = scene.method(RANDOM).and_then(|m| m.curve.first()) else { return Ok(()) };
+    let Some(first) = random.curve.first() else { return Ok(()) };
     let start = (x_of(axis, first).log10(), (first.most.log10() + 0.06).min(high));
     for (slope, name) in [(-0.5, "slope −1/2"), (-1.0, "slope −1")] {
         let end_x = x1.min(start.0 + (low - start.1) / slope);
         let at = |x: f64| (x, start.1 + slope * (x - start.0));
         let pen = INK.mix(0.55).stroke_width(1);
         chart.draw_series(LineSeries::new([start, at(end_x)], pen)).map_err(text)?;
-        let place = at(x0 + 0.97 * (end_x - x0));
-        let corner = Pos::new(HPos::Right, VPos::Bottom);
+        // To the right of a falling line there is room above it.
+        let (x, y) = at(x0 + 0.8 * (end_x - x0));
+        let corner = Pos::new(HPos::Left, VPos::Bottom);
         let font = (FONT, 12).into_font().color(&INK.mix(0.8)).pos(corner);
-        // Right of a falling line there is room above it, left of it below.
-        let shifted = if slope < -0.75 {
-            (place.0 - 0.015 * (x1 - x0), place.1)
-        } else {
-            (place.0, place.1 + 0.02 * (high - low))
-        };
+        let shifted = (x + 0.006 * (x1 - x0), y + 0.004 * (high - low));
         chart.draw_series([Text::new(name, shifted, font)]).map_err(text)?;
     }
     Ok(())

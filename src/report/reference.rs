@@ -1,5 +1,6 @@
 //! What errors are measured against: a long run of our own, kept on disk, or a picture that is given.
 
+use super::curve::Measure;
 use super::measure::{Tracing, picture, traceable};
 use super::{ReportError, facts};
 use crate::app::App;
@@ -66,13 +67,18 @@ pub struct Making {
     pub seconds: f64,
     /// Its own standard error, from its two halves, in the measure of the RMSE.
     pub standard_error: f64,
+    /// The same without the pixels that see a light, if there are such.
+    pub standard_error_surfaces: Option<f64>,
 }
 
 impl ReferenceFacts {
-    /// Its own standard error, if it is known.
+    /// Its own standard error by one measure, if it is known.
     #[must_use]
-    pub fn standard_error(&self) -> Option<f64> {
-        self.made.map(|making| making.standard_error)
+    pub fn standard_error(&self, measure: Measure) -> Option<f64> {
+        self.made.and_then(|making| match measure {
+            Measure::All => Some(making.standard_error),
+            Measure::Surfaces => making.standard_error_surfaces,
+        })
     }
 }
 
@@ -114,7 +120,7 @@ pub fn given(path: &Path, scene: &str, wanted: UVec2) -> Result<Reference, Repor
 /// If it cannot be written.
 pub fn made(
     app: &App,
-    settings: &RenderSettings,
+    (settings, surfaces): (&RenderSettings, Option<&[bool]>),
     (folder, name): (&Path, &str),
     seconds: f64,
     interrupt: &AtomicBool,
@@ -143,7 +149,8 @@ pub fn made(
     let making = Making {
         samples: tracing.samples(),
         seconds: tracing.seconds,
-        standard_error: standard_error(&tracing.film),
+        standard_error: standard_error(&tracing.film, None),
+        standard_error_surfaces: surfaces.map(|mask| standard_error(&tracing.film, Some(mask))),
     };
     save(&path, &tracing.film, &Display::default())?;
     write_whole(&beside, &serde_json::to_vec_pretty(&making)?)?;
@@ -158,16 +165,18 @@ fn cached(path: &Path, beside: &Path, size: UVec2) -> Option<(LinearImage, Makin
     whole.then_some((picture, making))
 }
 
-/// Root of the mean over pixels and channels of ((A − B) / 2)², A and B being the film's halves.
+/// Root of the mean over pixels (those of a mask) and channels of ((A − B) / 2)², A and B being the film's
+/// halves.
 #[must_use]
-pub fn standard_error(film: &Film) -> f64 {
-    let square = |pixel: &crate::trace::film::Pixel| {
+pub fn standard_error(film: &Film, mask: Option<&[bool]>) -> f64 {
+    let pixels = (0..film.size().y).flat_map(|y| film.row(y)).enumerate();
+    let (mut sum, mut count) = (0.0, 0);
+    for (_, pixel) in pixels.filter(|(i, _)| mask.is_none_or(|mask| mask[*i])) {
         let halves = pixel.half_mean(0).zip(pixel.half_mean(1));
-        let half = halves.map_or(DVec3::ZERO, |(a, b)| 0.5 * (a - b));
-        half.length_squared()
-    };
-    let sum: f64 = (0..film.size().y).flat_map(|y| film.row(y)).map(square).sum();
-    (sum / (3.0 * f64::from(film.size().element_product()))).sqrt()
+        sum += halves.map_or(DVec3::ZERO, |(a, b)| 0.5 * (a - b)).length_squared();
+        count += 1;
+    }
+    (sum / (3.0 * f64::from(count.max(1)))).sqrt()
 }
 
 #[cfg(test)]
@@ -182,7 +191,9 @@ mod tests {
             pixel.add(0, Vec3::new(1.0, 2.0, 3.0));
             pixel.add(1, Vec3::new(3.0, 2.0, 3.0));
         }
-        assert!((standard_error(&film) - (1.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert!((standard_error(&film, None) - (1.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        film.tiles_mut()[0].pixels_mut()[0].add(2, Vec3::splat(100.0));
+        assert!((standard_error(&film, Some(&[false, true])) - (1.0f64 / 3.0).sqrt()).abs() < 1e-12);
     }
 
     #[test]

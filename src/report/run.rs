@@ -1,13 +1,13 @@
 //! Measures everything, scene by scene.
 
+use super::curve::{Findings, Measure};
 use super::facts::Facts;
 use super::machine::Machine;
-use super::measure::{Performance, Run, Subject, Tracing, run, traceable};
+use super::measure::{Performance, Run, Subject, Tracing, run, surfaces, traceable};
 use super::methods::{METHODS, Method, OURS, RANDOM};
 use super::pictures::Pictures;
 use super::plan::Plan;
 use super::reference::{self, Reference};
-use super::statistics::first_below;
 use super::{GivenReference, MethodReport, Report, ReportError, ReportJob, SceneReport, curve, noise_check};
 use crate::image::Display;
 use crate::image::compare::LinearImage;
@@ -103,6 +103,8 @@ fn measure_scene(
     }
     let facts = Facts::of(&app, opening + first.seconds);
     drop(first);
+    let mask = surfaces(&app, &settings);
+    let mask = mask.as_deref();
     let reference = match given {
         Some(given) => given,
         None => {
@@ -110,7 +112,7 @@ fn measure_scene(
             let place = (job.folder.join(REFERENCES), name);
             let place = (place.0.as_path(), place.1);
             let tell = |seconds| clock.at(seconds, &what);
-            match reference::made(&app, &settings, place, plan.reference, &job.interrupt, tell)? {
+            match reference::made(&app, (&settings, mask), place, plan.reference, &job.interrupt, tell)? {
                 Some(made) => made,
                 None => return Ok(None),
             }
@@ -118,10 +120,15 @@ fn measure_scene(
     };
     clock.done += plan.reference;
 
-    let subject = Subject { app: &app, settings, reference: &reference.picture, interrupt: &job.interrupt };
+    let subject = Subject {
+        app: &app,
+        settings,
+        reference: &reference.picture,
+        surfaces: mask,
+        interrupt: &job.interrupt,
+    };
     let (measured, kept) = all_methods(&subject, name, plan, clock);
-    let reference_error = reference.facts.standard_error();
-    let methods = method_reports(measured, reference_error);
+    let methods = method_reports(measured, |measure| reference.facts.standard_error(measure));
     let performance = methods
         .iter()
         .find(|m| m.name == OURS)
@@ -149,7 +156,7 @@ fn measure_scene(
         performance,
         methods,
         noise_check,
-        pictures: Pictures::new(&kept, &reference.picture, app.world.resource::<Display>()),
+        pictures: Pictures::new(&kept, (&reference.picture, mask), app.world.resource::<Display>()),
         reference: reference.facts,
     }))
 }
@@ -180,29 +187,33 @@ fn all_methods(subject: &Subject, name: &str, plan: &Plan, clock: &mut Clock) ->
     (measured, kept)
 }
 
-fn method_reports(measured: Measured, reference_error: Option<f64>) -> Vec<MethodReport> {
+fn method_reports(measured: Measured, reference_error: impl Fn(Measure) -> Option<f64>) -> Vec<MethodReport> {
+    let findings = |runs: &[Run], measure| {
+        let curve = curve::curve(runs, measure);
+        let slope = curve::slope(&curve, reference_error(measure));
+        Findings { curve, slope, seconds_to_random_error: None }
+    };
     let mut reports: Vec<MethodReport> = measured
         .into_iter()
         .filter(|(_, runs)| runs.iter().any(|run| !run.points.is_empty()))
-        .map(|(method, runs)| {
-            let curve = curve::curve(&runs);
-            MethodReport {
-                name: method.name,
-                title: method.title,
-                changes: method.changes,
-                ablation: method.ablation,
-                slope: curve::slope(&curve, reference_error),
-                runs,
-                curve,
-                seconds_to_random_error: None,
-            }
+        .map(|(method, runs)| MethodReport {
+            name: method.name,
+            title: method.title,
+            changes: method.changes,
+            ablation: method.ablation,
+            all: findings(&runs, Measure::All),
+            surfaces: Some(findings(&runs, Measure::Surfaces)).filter(|found| !found.curve.is_empty()),
+            runs,
         })
         .collect();
-    let level = reports.iter().find(|m| m.name == RANDOM).and_then(|m| Some(m.curve.last()?.rmse));
-    if let Some(level) = level {
-        for method in &mut reports {
-            let points: Vec<(f64, f64)> = method.curve.iter().map(|p| (p.seconds, p.rmse)).collect();
-            method.seconds_to_random_error = first_below(&points, level);
+    let random = reports.iter().find(|m| m.name == RANDOM).cloned();
+    let level = |found: &Findings| found.curve.last().map(|last| last.rmse);
+    let all = random.as_ref().and_then(|m| level(&m.all));
+    let surfaces = random.as_ref().and_then(|m| level(m.surfaces.as_ref()?));
+    for method in &mut reports {
+        method.all.race_to(all);
+        if let Some(found) = &mut method.surfaces {
+            found.race_to(surfaces);
         }
     }
     reports

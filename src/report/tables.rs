@@ -1,6 +1,6 @@
 //! The tables, once for Markdown and page alike.
 
-use super::curve::TRUSTED;
+use super::curve::{Measure, TRUSTED};
 use super::measure::{MOMENTS, NOISE_LEVELS, PICTURE_SAMPLES};
 use super::methods::{OURS, RANDOM};
 use super::reference::Origin;
@@ -71,9 +71,17 @@ pub fn performance(report: &Report) -> Table {
     row("bounce rays, million/s", &|s| figure(s.performance.bounce_rays_per_second * 1e-6));
     for (i, moment) in MOMENTS.iter().enumerate() {
         let name = format!("RMSE after {moment} s");
-        row(&name, &|s| error(s.performance.rmse_after[i], s.reference.standard_error()));
+        row(&name, &|s| error(s.performance.rmse_after[i], s.reference.standard_error(Measure::All)));
     }
-    row("reference's own standard error", &|s| maybe(s.reference.standard_error()));
+    row("reference's own standard error", &|s| maybe(s.reference.standard_error(Measure::All)));
+    if scenes.iter().any(|s| s.measures().contains(&Measure::Surfaces)) {
+        let own = |s: &SceneReport| s.reference.standard_error(Measure::Surfaces);
+        for (i, moment) in MOMENTS.iter().enumerate() {
+            let name = format!("RMSE after {moment} s, where no light is seen");
+            row(&name, &|s| error(s.performance.rmse_surfaces_after[i], own(s)));
+        }
+        row("reference's own, where no light is seen", &|s| maybe(own(s)));
+    }
     row("reference, samples per pixel", &|s| match (s.reference.made, s.reference.origin) {
         (Some(made), Origin::Cached) => format!("{} (from an earlier report)", made.samples),
         (Some(made), _) => made.samples.to_string(),
@@ -100,10 +108,11 @@ pub fn performance(report: &Report) -> Table {
 
 /// A row for each method.
 #[must_use]
-pub fn methods(scene: &SceneReport) -> Table {
-    let own = scene.reference.standard_error();
-    let level = scene.method(RANDOM).and_then(|m| Some(m.curve.last()?.rmse));
-    let slowest = scene.method(RANDOM).and_then(|m| m.seconds_to_random_error);
+pub fn methods(scene: &SceneReport, measure: Measure) -> Table {
+    let own = scene.reference.standard_error(measure);
+    let random = scene.method(RANDOM).and_then(|m| m.findings(measure));
+    let level = random.and_then(|found| Some(found.curve.last()?.rmse));
+    let slowest = random.and_then(|found| found.seconds_to_random_error);
     let head = [
         "method".to_owned(),
         "slope over samples".to_owned(),
@@ -114,20 +123,21 @@ pub fn methods(scene: &SceneReport) -> Table {
         "times as fast as plain random".to_owned(),
     ];
     let row = |method: &MethodReport| {
-        let at = method.curve.iter().find(|p| p.samples == PICTURE_SAMPLES);
-        let over_time: Vec<(f64, f64)> = method.curve.iter().map(|p| (p.seconds, p.rmse)).collect();
-        vec![
+        let found = method.findings(measure)?;
+        let at = found.curve.iter().find(|p| p.samples == PICTURE_SAMPLES);
+        let over_time: Vec<(f64, f64)> = found.curve.iter().map(|p| (p.seconds, p.rmse)).collect();
+        Some(vec![
             method.title.to_owned(),
-            method.slope.map_or_else(
+            found.slope.map_or_else(
                 || NOTHING.to_owned(),
                 |fit| format!("{:.3} ± {:.3}", fit.slope, fit.standard_error).replace('-', "−"),
             ),
             error(at.map(|p| p.rmse), own),
             at.map_or_else(|| NOTHING.to_owned(), |p| format!("{} – {}", figure(p.least), figure(p.most))),
             error(value_at(&over_time, 1.0), own),
-            maybe(method.seconds_to_random_error),
-            maybe(slowest.zip(method.seconds_to_random_error).map(|(slow, own)| slow / own)),
-        ]
+            maybe(found.seconds_to_random_error),
+            maybe(slowest.zip(found.seconds_to_random_error).map(|(slow, own)| slow / own)),
+        ])
     };
     let mut notes: Vec<String> =
         scene.methods.iter().map(|method| format!("{}: {}.", method.title, method.changes)).collect();
@@ -136,7 +146,7 @@ pub fn methods(scene: &SceneReport) -> Table {
         "{runs} seeds, root mean square over them. Slopes are fitted in log-log from 4 samples on, where the error \
          is at least {TRUSTED} times the reference's own; ± is the standard error of the fit."
     ));
-    Table { head: head.to_vec(), rows: scene.methods.iter().map(row).collect(), notes }
+    Table { head: head.to_vec(), rows: scene.methods.iter().filter_map(row).collect(), notes }
 }
 
 /// A row for each scene.
@@ -155,10 +165,14 @@ pub fn noise(report: &Report) -> Table {
             format!("{:.3} ± {:.3}", check.mean, check.mean_error),
             format!("± {:.3}", check.deviation),
             format!("{low:.3} – {middle:.3} – {high:.3}"),
+            format!("{:.3} ± {:.3}", check.mean_alike, check.mean_alike_error),
         ])
     };
     let note = "The noise number, which the program tells without a reference, over the true error in the same \
-                measure. 1 is right; ± behind the mean is its standard error, the spread one standard deviation.";
+                measure. 1 is right; ± behind the mean is its standard error, the spread one standard deviation. \
+                True errors are relative to the reference's brightness. The noise number knows only the picture's \
+                own, which is too high just where a pixel met more light than it should have; the last column has \
+                that in both.";
     Table {
         head: head.map(str::to_owned).to_vec(),
         rows: report.scenes.iter().filter_map(row).collect(),

@@ -1,5 +1,6 @@
 //! Findings → files.
 
+use super::curve::Measure;
 use super::markdown::markdown;
 use super::page::page;
 use super::plot::{Axis, curves};
@@ -20,10 +21,12 @@ pub fn write(report: &Report, folder: &Path) -> Result<Vec<PathBuf>, ReportError
         ("report.json".to_owned(), serde_json::to_vec_pretty(report)?),
     ];
     for scene in &report.scenes {
-        for (axis, ending) in [(Axis::Seconds, "seconds"), (Axis::Samples, "samples")] {
-            // A run that was interrupted early has no curve; the page says so in its place.
-            if let Ok(svg) = curves(scene, axis) {
-                files.push((format!("{}-{ending}.svg", scene.name), svg.into_bytes()));
+        for measure in scene.measures() {
+            for axis in [Axis::Seconds, Axis::Samples] {
+                // A run that was interrupted early has no curve; the page says so in its place.
+                if let Ok(svg) = curves(scene, axis, measure) {
+                    files.push((plot_name(&scene.name, axis, measure), svg.into_bytes()));
+                }
             }
         }
         let pictures = &scene.pictures;
@@ -40,19 +43,39 @@ pub fn write(report: &Report, folder: &Path) -> Result<Vec<PathBuf>, ReportError
     Ok(paths)
 }
 
+/// File name of a plot.
+#[must_use]
+pub fn plot_name(scene: &str, axis: Axis, measure: Measure) -> String {
+    let over = match axis {
+        Axis::Seconds => "seconds",
+        Axis::Samples => "samples",
+    };
+    match measure {
+        Measure::All => format!("{scene}-{over}.svg"),
+        Measure::Surfaces => format!("{scene}-{over}-surfaces.svg"),
+    }
+}
+
 /// Every measurement, one a line.
 fn csv(report: &Report) -> String {
-    let mut out = String::from("scene,method,seed,samples,seconds,rmse,noise\n");
+    let mut out = String::from("scene,method,seed,samples,seconds,rmse,rmse_surfaces,noise\n");
     for scene in &report.scenes {
         for method in &scene.methods {
             for run in &method.runs {
                 for point in &run.points {
-                    let noise = point.noise.map(|n| format!("{n:.6e}")).unwrap_or_default();
+                    let maybe = |x: Option<f64>| x.map(|x| format!("{x:.6e}")).unwrap_or_default();
                     // Into memory: cannot fail.
                     let _ = writeln!(
                         out,
-                        "{},{},{},{},{:.6},{:.6e},{noise}",
-                        scene.name, method.name, run.seed, point.samples, point.seconds, point.rmse
+                        "{},{},{},{},{:.6},{:.6e},{},{}",
+                        scene.name,
+                        method.name,
+                        run.seed,
+                        point.samples,
+                        point.seconds,
+                        point.rmse,
+                        maybe(point.rmse_surfaces),
+                        maybe(point.noise)
                     );
                 }
             }
