@@ -1,6 +1,6 @@
 //! Several runs of one method → one curve with a band.
 
-use super::measure::Run;
+use super::measure::{Run, checkpoints};
 use super::statistics::{Fit, first_below, fit_power};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -52,7 +52,7 @@ impl Findings {
 }
 
 /// Where a fit begins: before, the error still depends on where the samples happen to lie.
-const FIT_FROM: u32 = 4;
+pub const FIT_FROM: u32 = 8;
 /// An error is taken as measured if it is so many times the reference's own.
 pub const TRUSTED: f64 = 4.0;
 
@@ -66,10 +66,11 @@ pub fn curve(runs: &[Run], measure: Measure) -> Vec<CurvePoint> {
         }
     }
     // Runs that end by time end anywhere: such a point of one run would stand out among means of all.
-    let shared = by_samples.iter().filter(|(_, runs)| runs.len() > 1).map(|(&n, _)| n).max().unwrap_or(0);
+    let last = by_samples.keys().last().copied();
+    let grid: Vec<u32> = checkpoints().collect();
     by_samples
         .into_iter()
-        .filter(|(samples, points)| points.len() > 1 || *samples > shared || runs.len() < 2)
+        .filter(|(samples, _)| Some(*samples) == last || grid.binary_search(samples).is_ok())
         .map(|(samples, points)| {
             let n = points.len() as f64;
             let errors = || points.iter().map(|p| p.1);
@@ -114,20 +115,20 @@ mod tests {
 
     #[test]
     fn a_run_that_ends_between_does_not_dent_the_curve() {
-        let runs = [run(&[(1, 3.0), (2, 2.0), (4, 1.0)]), run(&[(1, 4.0), (2, 2.0), (3, 9.0)])];
+        let runs = [run(&[(1, 3.0), (2, 2.0), (7, 1.0)]), run(&[(1, 4.0), (2, 2.0), (5, 9.0)])];
         assert!(curve(&runs, Measure::Surfaces).is_empty());
         let curve = curve(&runs, Measure::All);
-        assert_eq!(curve.iter().map(|p| p.samples).collect::<Vec<_>>(), [1, 2, 4]);
+        assert_eq!(curve.iter().map(|p| p.samples).collect::<Vec<_>>(), [1, 2, 7]);
         assert!((curve[0].rmse - 12.5f64.sqrt()).abs() < 1e-12);
         assert_eq!((curve[0].least, curve[0].most, curve[0].runs), (3.0, 4.0, 2));
     }
 
     #[test]
     fn errors_as_small_as_the_reference_s_are_not_fitted() {
-        let all: Vec<(u32, f64)> = (0..8).map(|i| (1 << i, 0.5f64.powi(i))).collect();
+        let all: Vec<(u32, f64)> = (1..9).map(|i| (1 << i, 0.5f64.powi(i))).collect();
         let curve = curve(&[run(&all)], Measure::All);
         assert_eq!(slope(&curve, None).unwrap().points, 6);
-        assert_eq!(slope(&curve, Some(0.5f64.powi(7))).unwrap().points, 4);
+        assert_eq!(slope(&curve, Some(0.5f64.powi(8))).unwrap().points, 4);
         assert_eq!(slope(&curve, Some(0.1)), None);
     }
 }

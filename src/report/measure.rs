@@ -142,18 +142,27 @@ pub fn checkpoints() -> impl Iterator<Item = u32> {
     (0..31).flat_map(|i| [Some(1 << i), (i > 0).then(|| (1 << i) + (1 << (i - 1)))]).flatten()
 }
 
-/// Which pixels see no light, rows from the top; `None` if none does, or all.
+/// Which pixels see no light, and have no neighbour that does; rows from the top. `None` if all do, or none.
 #[must_use]
 pub fn surfaces(app: &App, settings: &RenderSettings) -> Option<Vec<bool>> {
     // Without any bounce only what shines is seen.
     let settings = RenderSettings { max_depth: 0, ..*settings };
     let mut film = Film::new(settings.size, 0);
     trace_pass(&traceable(app, &settings), &mut film, MASK_SAMPLES, MASK_SAMPLES, || true);
-    let dark: Vec<bool> = linear_pixels(&film).into_iter().map(|p| p == Vec3::ZERO).collect();
+    let lit: Vec<bool> = linear_pixels(&film).into_iter().map(|p| p != Vec3::ZERO).collect();
+    // A sliver of a lamp may slip between the samples of its pixel, not of the next.
+    let (width, height) = (film.size().x as usize, film.size().y as usize);
+    let near_light = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
+        (y.saturating_sub(1)..=(y + 1).min(height - 1))
+            .any(|y| columns.clone().any(|x| lit[y * width + x]))
+    };
+    let dark: Vec<bool> = (0..lit.len()).map(|i| !near_light(i)).collect();
     (dark.contains(&true) && dark.contains(&false)).then_some(dark)
 }
 
-/// Samples that look for lights: one that so many miss covers little of its pixel.
+/// Samples that look for lights.
 const MASK_SAMPLES: u32 = 64;
 
 /// Root of the mean over pixels and channels of the squared difference; also over the pixels of a mask.

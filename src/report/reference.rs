@@ -58,7 +58,7 @@ pub struct ReferenceFacts {
     pub made: Option<Making>,
 }
 
-/// How a reference was made: kept beside it.
+/// How a reference was made: kept beside it. Fields of older files that are missing make it be made anew.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Making {
     /// Samples per pixel.
@@ -68,6 +68,7 @@ pub struct Making {
     /// Its own standard error, from its two halves, in the measure of the RMSE.
     pub standard_error: f64,
     /// The same without the pixels that see a light, if there are such.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub standard_error_surfaces: Option<f64>,
 }
 

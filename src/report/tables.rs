@@ -1,6 +1,6 @@
 //! The tables, once for Markdown and page alike.
 
-use super::curve::{Measure, TRUSTED};
+use super::curve::{FIT_FROM, Measure, TRUSTED};
 use super::measure::{MOMENTS, NOISE_LEVELS, PICTURE_SAMPLES};
 use super::methods::{OURS, RANDOM};
 use super::reference::Origin;
@@ -143,7 +143,7 @@ pub fn methods(scene: &SceneReport, measure: Measure) -> Table {
         scene.methods.iter().map(|method| format!("{}: {}.", method.title, method.changes)).collect();
     let runs = scene.method(OURS).map_or(0, |m| m.runs.len());
     notes.push(format!(
-        "{runs} seeds, root mean square over them. Slopes are fitted in log-log from 4 samples on, where the error \
+        "{runs} seeds, root mean square over them. Slopes are fitted in log-log from {FIT_FROM} samples on, where the error \
          is at least {TRUSTED} times the reference's own; ± is the standard error of the fit."
     ));
     Table { head: head.to_vec(), rows: scene.methods.iter().filter_map(row).collect(), notes }
@@ -165,14 +165,14 @@ pub fn noise(report: &Report) -> Table {
             format!("{:.3} ± {:.3}", check.mean, check.mean_error),
             format!("± {:.3}", check.deviation),
             format!("{low:.3} – {middle:.3} – {high:.3}"),
-            format!("{:.3} ± {:.3}", check.mean_alike, check.mean_alike_error),
+            format!("{:.3}", check.unweighted),
         ])
     };
     let note = "The noise number, which the program tells without a reference, over the true error in the same \
                 measure. 1 is right; ± behind the mean is its standard error, the spread one standard deviation. \
-                True errors are relative to the reference's brightness. The noise number knows only the picture's \
-                own, which is too high just where a pixel met more light than it should have; the last column has \
-                that in both.";
+                True errors are relative to the reference's brightness; the noise number knows only the picture's own, \
+                which is too high just where a pixel met more light than it should have, and too low where it met \
+                none. Without such weights (last column: root mean squares over all runs) the two must agree.";
     Table {
         head: head.map(str::to_owned).to_vec(),
         rows: report.scenes.iter().filter_map(row).collect(),
