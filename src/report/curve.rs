@@ -108,6 +108,7 @@ mod tests {
             samples,
             seconds: f64::from(samples),
             rmse,
+            rmse_surfaces: None,
             noise: None,
         });
         Run { points: points.collect(), ..Run::default() }

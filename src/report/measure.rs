@@ -155,8 +155,7 @@ pub fn surfaces(app: &App, settings: &RenderSettings) -> Option<Vec<bool>> {
     let near_light = |i: usize| {
         let (x, y) = (i % width, i / width);
         let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
-        (y.saturating_sub(1)..=(y + 1).min(height - 1))
-            .any(|y| columns.clone().any(|x| lit[y * width + x]))
+        (y.saturating_sub(1)..=(y + 1).min(height - 1)).any(|y| columns.clone().any(|x| lit[y * width + x]))
     };
     let dark: Vec<bool> = (0..lit.len()).map(|i| !near_light(i)).collect();
     (dark.contains(&true) && dark.contains(&false)).then_some(dark)
