@@ -2,7 +2,7 @@
 
 use crate::app::App;
 use crate::bvh::wide::{Child, WIDTH};
-use crate::bvh::{Blas, Tlas, WideBvh};
+use crate::bvh::{Blas, Placement, Tlas, WideBvh};
 use crate::trace::{Geometry, Lights, RenderSettings, Surfaces, Viewpoint};
 use glam::Vec3;
 use serde::Serialize;
@@ -56,7 +56,7 @@ impl Facts {
 
 /// Each mesh's hierarchy once.
 fn distinct(tlas: &Tlas) -> Vec<&Arc<Blas>> {
-    let mut all: Vec<&Arc<Blas>> = tlas.placements().iter().map(|p| p.blas()).collect();
+    let mut all: Vec<&Arc<Blas>> = tlas.placements().iter().map(Placement::blas).collect();
     all.sort_by_key(|blas| Arc::as_ptr(blas));
     all.dedup_by_key(|blas| Arc::as_ptr(blas));
     all

@@ -78,7 +78,7 @@ impl Pictures {
             let shown = developed(picture);
             pictures.shown.push(Shown::new(OURS.to_owned(), OURS.to_owned(), size, &shown));
             let places = worst(&inside(map), size, PLACES, SIDE);
-            pictures.worst = places.iter().map(|p| p.to_array()).collect();
+            pictures.worst = places.iter().map(UVec2::to_array).collect();
             let sheet = Sheet { size, places: &places, columns: [&shown, &truth, &colored(map)] };
             pictures.crops = (!places.is_empty()).then(|| sheet.draw());
         }

@@ -208,6 +208,6 @@ mod tests {
         assert!((independent / (7.0_f64 / 144.0 / 64.0).sqrt() - 1.0).abs() < 0.1, "{independent}");
         let stratified = spread(Sampling::Stratified);
         assert!(stratified < 0.5 * independent && spread(Sampling::Sobol) < 0.5 * stratified);
-        assert!(spread(Sampling::Shifted) < stratified);
+        assert!(spread(Sampling::Shifted) < 0.5 * independent);
     }
 }
