@@ -4,12 +4,15 @@ use crate::bvh::Isa;
 use crate::image::ToneMap;
 use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
+use crate::report::{GivenReference, ReportJob};
 use crate::scene::Filter;
-use crate::trace::Integrator;
+use crate::trace::{Integrator, Sampling};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::{DVec3, UVec2};
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
@@ -30,7 +33,6 @@ pub struct Cli {
 
 /// Everything but the window.
 #[derive(Debug, Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "made once, by clap")]
 pub enum Command {
     /// Render to a file, without a window
     Render(RenderArgs),
@@ -38,6 +40,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Make one picture of films that hold different samples of it
     Merge(MergeArgs),
+    /// Measure speed and error over time, and write tables, curves and a page
+    Report(ReportArgs),
 }
 
 /// Arguments of the window.
@@ -128,6 +132,9 @@ pub struct SceneArgs {
     /// Most bounces from eye to light: 0 shows only what shines, 1 direct light, 2 one bounce more
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
+    /// How the random numbers of a pixel are spread: same picture in the end, sooner or later
+    #[arg(long, value_enum)]
+    pub sampling: Option<SamplingArg>,
     /// Texture filter, whatever the file asks for
     #[arg(long, value_enum)]
     pub filter: Option<FilterArg>,
@@ -196,6 +203,48 @@ pub struct MergeArgs {
     pub quiet: bool,
 }
 
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Scenes to measure [default: cornell-point cornell bust]
+    #[arg(value_name = "SCENES")]
+    pub scenes: Vec<String>,
+    /// Folder to write index.html, report.md, .csv, .json and pictures to; references are kept there too
+    #[arg(long, value_name = "DIR", default_value = "report")]
+    pub out: PathBuf,
+    /// Under a minute in all: smaller pictures, shorter times
+    #[arg(long)]
+    pub quick: bool,
+    /// Measure this model in place of our owl, as third of the default scenes
+    #[arg(long, value_name = "FILE", conflicts_with = "scenes")]
+    pub monkey: Option<String>,
+    /// Size of the pictures [default: 256x256, 96x96 with --quick]
+    #[arg(long, value_name = "WxH", value_parser = resolution)]
+    pub resolution: Option<UVec2>,
+    /// direct or path, whatever the scenes say
+    #[arg(long, value_enum)]
+    pub integrator: Option<IntegratorArg>,
+    /// Most bounces from eye to light
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
+    /// Runs of each method, with different noise
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub seeds: u32,
+    /// Converged picture (.exr) to measure errors against, instead of making one; of which scene, if there
+    /// are several
+    #[arg(long, value_name = "[SCENE=]FILE")]
+    pub reference: Vec<String>,
+    /// Seconds to take in all [default: 540, 45 with --quick; at most a third of it for a scene]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub time: Option<Duration>,
+    /// Threads to trace with; 0 = all
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// No progress on standard error
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// See [`Integrator`].
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum IntegratorArg {
@@ -203,6 +252,19 @@ pub enum IntegratorArg {
     Direct,
     /// Global illumination.
     Path,
+}
+
+/// See [`Sampling`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum SamplingArg {
+    /// Each number by itself.
+    Independent,
+    /// A jittered grid of 4 x 4 cells, over and over.
+    Stratified,
+    /// Sobol' points with a random shift.
+    Shifted,
+    /// Sobol' points with Owen's scrambling: the default.
+    Sobol,
 }
 
 /// See [`Filter`].
@@ -221,6 +283,15 @@ pub enum ToneMapArg {
     Clip,
     /// Khronos PBR Neutral.
     Neutral,
+}
+
+impl IntegratorArg {
+    fn integrator(self) -> Integrator {
+        match self {
+            Self::Direct => Integrator::Direct,
+            Self::Path => Integrator::Path,
+        }
+    }
 }
 
 impl From<ToneMapArg> for ToneMap {
@@ -255,12 +326,15 @@ impl SceneArgs {
             size: self.resolution,
             samples: range.as_ref().map(|r| r.end - r.start).or(self.spp),
             first_sample: range.map(|r| r.start),
-            integrator: self.integrator.map(|i| match i {
-                IntegratorArg::Direct => Integrator::Direct,
-                IntegratorArg::Path => Integrator::Path,
-            }),
+            integrator: self.integrator.map(IntegratorArg::integrator),
             max_depth: self.max_depth,
             seed: self.seed,
+            sampling: self.sampling.map(|s| match s {
+                SamplingArg::Independent => Sampling::Independent,
+                SamplingArg::Stratified => Sampling::Stratified,
+                SamplingArg::Shifted => Sampling::Shifted,
+                SamplingArg::Sobol => Sampling::Sobol,
+            }),
             filter: self.filter.map(|f| match f {
                 FilterArg::Nearest => Filter::Nearest,
                 FilterArg::Bilinear => Filter::Bilinear,
@@ -276,6 +350,36 @@ impl SceneArgs {
                 view_angle: self.camera_view_angle,
             },
         }
+    }
+}
+
+impl ReportArgs {
+    /// What to measure.
+    ///
+    /// # Errors
+    /// If a scene is neither a file nor built in.
+    pub fn job(&self, interrupt: Arc<AtomicBool>) -> Result<ReportJob, LoadError> {
+        let monkey = self.monkey.as_deref().unwrap_or("bust");
+        let names: Vec<&str> = if self.scenes.is_empty() {
+            vec!["cornell-point", "cornell", monkey]
+        } else {
+            self.scenes.iter().map(String::as_str).collect()
+        };
+        let (size, total) = if self.quick { (96, 45) } else { (256, 540) };
+        Ok(ReportJob {
+            scenes: names.into_iter().map(SceneSource::parse).collect::<Result<_, _>>()?,
+            wishes: Wishes {
+                size: Some(self.resolution.unwrap_or(UVec2::splat(size))),
+                integrator: self.integrator.map(IntegratorArg::integrator),
+                max_depth: self.max_depth,
+                ..Wishes::default()
+            },
+            seeds: self.seeds,
+            total: self.time.unwrap_or(Duration::from_secs(total)),
+            references: self.reference.iter().map(|text| GivenReference::parse(text)).collect(),
+            folder: self.out.clone(),
+            interrupt,
+        })
     }
 }
 

@@ -14,6 +14,7 @@ pub mod load;
 pub mod open;
 pub mod preview;
 pub mod render;
+pub mod report;
 pub mod scene;
 pub mod sync;
 pub mod trace;

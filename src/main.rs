@@ -2,13 +2,14 @@
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
-use penumbra::cli::{Cli, Command, CompareArgs, MergeArgs, OutputArgs, SceneArgs, WindowArgs};
+use penumbra::cli::{Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs};
 use penumbra::farm::{self, is_film};
 use penumbra::image::compare::compare_files;
 use penumbra::image::{ImageError, PictureFormat, save};
 use penumbra::load::{LoadReport, built_in_scenes};
 use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
+use penumbra::report::{Report, ReportError, measure_all, write};
 #[cfg(feature = "view")]
 use penumbra::{app::FrameBudget, open::open, trace::RenderSettings};
 use std::io::IsTerminal;
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Some(Command::Render(args)) => headless(&args.scene, &args.output),
         Some(Command::Compare(args)) => compare(&args),
         Some(Command::Merge(args)) => merge(&args),
+        Some(Command::Report(args)) => report(&args),
         None if cli.window.list_scenes => {
             for scene in built_in_scenes() {
                 println!("{:<15} {}", scene.name, scene.description);
@@ -288,10 +290,16 @@ impl Bar {
         let (part, left) = how_far(progress);
         let left = left.map_or("—".to_owned(), |seconds| format!("{seconds:.0} s left"));
         let noise = progress.noise.map_or("—".to_owned(), |n| format!("{:.2} %", n * 100.0));
-        let message = format!(
-            "{:.0} samples per pixel, noise {noise}, {:.0} s, {left}",
-            progress.samples, progress.seconds
+        self.show(
+            part,
+            format!(
+                "{:.0} samples per pixel, noise {noise}, {:.0} s, {left}",
+                progress.samples, progress.seconds
+            ),
         );
+    }
+
+    fn show(&self, part: f64, message: String) {
         if let Some(bar) = &self.bar {
             bar.set_position((part * 1000.0) as u64);
             bar.set_message(message);
@@ -347,6 +355,56 @@ fn merge(args: &MergeArgs) -> u8 {
         }
     }
     0
+}
+
+fn report(args: &ReportArgs) -> u8 {
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let job = match args.job(Arc::clone(&interrupt)) {
+        Ok(job) => job,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::SCENE_NOT_READABLE;
+        }
+    };
+    set_threads(args.threads);
+    stop_on_signals(&interrupt);
+    let bar = Bar::new(args.quiet);
+    let measured = measure_all(&job, |progress| {
+        bar.show(progress.part, format!("{}, {:.0} s left", progress.what, progress.seconds_left));
+    });
+    bar.clear();
+    match measured.and_then(|report| Ok((write(&report, &job.folder)?, report))) {
+        Ok((files, report)) => {
+            if !args.quiet {
+                eprint!("{}", slopes(&report));
+                eprintln!("wrote {} files; read {}", files.len(), job.folder.join("index.html").display());
+            }
+            if report.interrupted { exit::INTERRUPTED } else { 0 }
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            match error {
+                ReportError::Open(OpenError::Load(_)) => exit::SCENE_NOT_READABLE,
+                ReportError::ReferenceScene { .. } => exit::BAD_COMMAND_LINE,
+                _ => exit::FAILED,
+            }
+        }
+    }
+}
+
+/// A line for each method on each scene.
+fn slopes(report: &Report) -> String {
+    let mut lines = String::new();
+    for scene in &report.scenes {
+        for method in &scene.methods {
+            let found = method.surfaces.as_ref().unwrap_or(&method.all);
+            let slope = found.slope.map_or("—".to_owned(), |fit| format!("{:+.3}", fit.slope));
+            let error = found.curve.last().map_or(0.0, |point| point.rmse);
+            lines +=
+                &format!("{:<16} {:<18} slope {slope}, last RMSE {error:.2e}\n", scene.name, method.title);
+        }
+    }
+    lines
 }
 
 fn compare(args: &CompareArgs) -> u8 {

@@ -7,7 +7,7 @@ use crate::image::{Display, ToneMap};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Projection, Transform};
 use crate::sync::Instructions;
-use crate::trace::{Film, Integrator, RenderSettings};
+use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2};
@@ -28,6 +28,8 @@ pub struct Wishes {
     pub max_depth: Option<u32>,
     /// See [`RenderSettings::seed`].
     pub seed: Option<u32>,
+    /// See [`RenderSettings::sampling`].
+    pub sampling: Option<Sampling>,
     /// Overrides the textures' own filters.
     pub filter: Option<Filter>,
     /// Exposure in stops.
@@ -109,6 +111,8 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
             Some(SidecarFilter::Bilinear) => Some(Filter::Bilinear),
             _ => None,
         }),
+        sampling: wishes.sampling.unwrap_or(default.sampling),
+        pixel_sampling: default.pixel_sampling,
     };
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);

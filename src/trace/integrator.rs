@@ -89,7 +89,7 @@ impl Batch {
         for sample in first..first + count {
             for i in 0..tile.size.element_product() {
                 let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
-                let sampler = Sampler::new(pixel, sample, scene.settings.seed);
+                let sampler = Sampler::new(pixel, sample, scene.settings.seed).spread(scene.settings);
                 let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), size);
                 let entry = self.keys.len() as u32;
                 self.keys.push((i, sample));

@@ -26,4 +26,4 @@ pub use film::Film;
 pub use lights::Lights;
 pub use pass::{RayCounts, trace_pass};
 pub use scene::{Coverage, Geometry, Surfaces, TraceScene};
-pub use settings::{Integrator, RenderSettings};
+pub use settings::{Integrator, RenderSettings, Sampling};

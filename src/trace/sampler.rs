@@ -6,6 +6,7 @@
 //! References: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020; the permutation
 //! with better constants is N. Vegdahl's ("Building a Better LK Hash", psychopath.io, 2021).
 
+use super::{RenderSettings, Sampling};
 use glam::{UVec2, Vec2};
 
 /// The numbers of one sample of one pixel.
@@ -15,6 +16,10 @@ use glam::{UVec2, Vec2};
 pub struct Sampler {
     seed: u32,
     index: u32,
+    /// Of pair 0, the place in the pixel.
+    pixel_sampling: Sampling,
+    /// Of all other pairs.
+    sampling: Sampling,
 }
 
 impl Sampler {
@@ -23,16 +28,38 @@ impl Sampler {
     pub fn new(pixel: UVec2, index: u32, seed: u32) -> Self {
         let half = index & 1;
         let seed = hash(pixel.x ^ hash(pixel.y ^ hash(seed ^ hash(half ^ 0x5bd1_e995))));
-        Self { seed, index: index >> 1 }
+        Self { seed, index: index >> 1, pixel_sampling: Sampling::Sobol, sampling: Sampling::Sobol }
+    }
+
+    /// The same, its numbers spread as `settings` say.
+    #[must_use]
+    pub fn spread(self, settings: &RenderSettings) -> Self {
+        let sampling = settings.sampling;
+        Self { sampling, pixel_sampling: settings.pixel_sampling.unwrap_or(sampling), ..self }
     }
 
     /// Two numbers in [0, 1), stratified together over the samples of this pixel.
     #[must_use]
     pub fn pair(&self, dimension: u32) -> Vec2 {
         let seed = hash(self.seed ^ dimension.wrapping_mul(0x9e37_79b9));
-        let index = owen_scramble(self.index, seed);
-        let x = owen_scramble(index.reverse_bits(), hash(seed ^ 0x68bc_21eb));
-        let y = owen_scramble(sobol_1(index), hash(seed ^ 0x02e5_be93));
+        let (x_seed, y_seed) = (hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93));
+        let (x, y) = match if dimension == 0 { self.pixel_sampling } else { self.sampling } {
+            Sampling::Sobol => {
+                let index = owen_scramble(self.index, seed);
+                (owen_scramble(index.reverse_bits(), x_seed), owen_scramble(sobol_1(index), y_seed))
+            }
+            Sampling::Shifted => {
+                // Shuffled all the same: otherwise all pairs would be the same points.
+                let index = owen_scramble(self.index, seed);
+                (index.reverse_bits().wrapping_add(x_seed), sobol_1(index).wrapping_add(y_seed))
+            }
+            Sampling::Independent => (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index))),
+            Sampling::Stratified => {
+                let cell = shuffle_16(self.index & 15, hash(seed ^ hash(self.index >> 4)));
+                let within = |seed| hash(seed ^ hash(self.index)) >> 2;
+                (cell << 30 | within(x_seed), cell >> 2 << 30 | within(y_seed))
+            }
+        };
         Vec2::new(unit_float(x), unit_float(y))
     }
 
@@ -57,6 +84,16 @@ pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 15;
     x = x.wrapping_mul(0x846c_a68b);
     x ^ x >> 16
+}
+
+/// A permutation of 0 to 15, chosen by `seed`.
+fn shuffle_16(x: u32, seed: u32) -> u32 {
+    // Each step can be undone: adding, multiplying by an odd number, folding the high half into the low.
+    (0..4).fold(x, |x, round| {
+        let key = seed >> (8 * round);
+        let x = (x.wrapping_add(key).wrapping_mul(key >> 3 | 1)) & 15;
+        x ^ x >> 2
+    })
 }
 
 /// Owen's nested uniform scrambling of the binary digits of `x`, most significant first.
@@ -137,5 +174,40 @@ mod tests {
         }
         let chi2: f64 = bins.iter().map(|&b| (f64::from(b) - 100.0).powi(2) / 100.0).sum();
         assert!(chi2 < 161.0, "χ² = {chi2}");
+    }
+
+    #[test]
+    fn sixteen_stratified_samples_fill_sixteen_cells() {
+        let settings = RenderSettings { sampling: Sampling::Stratified, ..RenderSettings::default() };
+        for (block, dimension, half) in [(0, 0, 0), (3, 4, 1), (1000, 70, 0)] {
+            let mut cells: Vec<u32> = (0..16)
+                .map(|i| Sampler::new(UVec2::new(5, 9), 2 * (16 * block + i) + half, 1).spread(&settings))
+                .map(|sampler| sampler.pair(dimension) * 4.0)
+                .map(|p| p.x as u32 + 4 * p.y as u32)
+                .collect();
+            cells.sort_unstable();
+            assert!(cells.iter().copied().eq(0..16), "{cells:?}");
+        }
+    }
+
+    #[test]
+    fn all_ways_of_sampling_have_the_same_mean_and_differ_in_spread() {
+        // ∫ x y over the square is 1/4; its variance with one sample 7/144.
+        let spread = |sampling| {
+            let settings = RenderSettings { sampling, ..RenderSettings::default() };
+            let errors = (0..1000).map(|seed| {
+                let of = |i| Sampler::new(UVec2::new(1, 2), i, seed).spread(&settings).pair(4);
+                (0..64).map(|i| f64::from(of(i).x * of(i).y)).sum::<f64>() / 64.0 - 0.25
+            });
+            let (sum, square) = errors.fold((0.0, 0.0), |(s, q), e| (s + e, q + e * e));
+            let deviation = (square / 1000.0_f64).sqrt();
+            assert!((sum / 1000.0_f64).abs() < 4.5 * deviation / 1000f64.sqrt(), "{sampling:?}: bias");
+            deviation
+        };
+        let independent = spread(Sampling::Independent);
+        assert!((independent / (7.0_f64 / 144.0 / 64.0).sqrt() - 1.0).abs() < 0.1, "{independent}");
+        let stratified = spread(Sampling::Stratified);
+        assert!(stratified < 0.5 * independent && spread(Sampling::Sobol) < 0.5 * stratified);
+        assert!(spread(Sampling::Shifted) < 0.5 * independent);
     }
 }

@@ -18,6 +18,25 @@ pub struct RenderSettings {
     pub seed: u32,
     /// Overrides the texture filter that the file asks for.
     pub filter: Option<Filter>,
+    /// How the random numbers of a pixel are spread.
+    pub sampling: Sampling,
+    /// The same for the places in the pixel alone; `None`: as all others.
+    pub pixel_sampling: Option<Sampling>,
+}
+
+/// How the random numbers of a pixel are spread over its samples. All give the same picture in the end;
+/// they differ in how soon.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampling {
+    /// Each number by itself: what `rand()` would do. The error falls with the root of the samples.
+    Independent,
+    /// Sixteen samples of each half at a time in a jittered grid of 4 × 4 cells, one in each.
+    Stratified,
+    /// [`Sampling::Sobol`] with a random shift in place of the scrambling: as even, but not as random.
+    Shifted,
+    /// A (0, 2)-sequence, scrambled by Owen's permutations.
+    #[default]
+    Sobol,
 }
 
 /// How light is gathered.
@@ -38,6 +57,8 @@ impl Default for RenderSettings {
             max_depth: 8,
             seed: 0,
             filter: None,
+            sampling: Sampling::Sobol,
+            pixel_sampling: None,
         }
     }
 }

@@ -1,0 +1,95 @@
+//! What is compared: one table, a row for each way to render. A new technique that can be switched is a
+//! new row here and a field of [`RenderSettings`].
+
+use crate::trace::{RenderSettings, Sampling};
+
+/// One way to render.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    /// Short, without spaces.
+    pub name: &'static str,
+    /// For people.
+    pub title: &'static str,
+    /// What it changes of ours, in words.
+    pub changes: &'static str,
+    /// Ours with one thing switched off, not a peer.
+    pub ablation: bool,
+    /// What it changes in the settings.
+    pub apply: fn(&mut RenderSettings),
+}
+
+/// The row that everything is compared with, and that is measured longest.
+pub const OURS: &str = "ours";
+/// What the ancestor did.
+pub const RANDOM: &str = "random";
+
+/// All of them, in the order of the tables.
+pub const METHODS: [Method; 6] = [
+    Method {
+        name: RANDOM,
+        title: "plain random",
+        changes: "every number independent, as the ancestor sampled its area lights",
+        ablation: false,
+        apply: |settings| settings.sampling = Sampling::Independent,
+    },
+    Method {
+        name: "stratified",
+        title: "stratified 4×4",
+        changes: "a jittered grid of 4 × 4 cells, over and over",
+        ablation: false,
+        apply: |settings| settings.sampling = Sampling::Stratified,
+    },
+    Method {
+        name: OURS,
+        title: "ours",
+        changes: "(0, 2)-sequences with Owen scrambling for the pixel, the lights and the bounces",
+        ablation: false,
+        apply: |_| {},
+    },
+    Method {
+        name: "shifted",
+        title: "ours − scrambling",
+        changes: "the same sequences with a random shift in place of Owen's scrambling",
+        ablation: true,
+        apply: |settings| settings.sampling = Sampling::Shifted,
+    },
+    Method {
+        name: "random-pixel",
+        title: "ours − pixel",
+        changes: "independent places in the pixel, the rest as ours",
+        ablation: true,
+        apply: |settings| settings.pixel_sampling = Some(Sampling::Independent),
+    },
+    Method {
+        name: "random-light",
+        title: "ours − lights",
+        changes: "independent samples of lights and bounces, the places in the pixel as ours",
+        ablation: true,
+        apply: |settings| {
+            settings.sampling = Sampling::Independent;
+            settings.pixel_sampling = Some(Sampling::Sobol);
+        },
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_but_ours_changes_something_of_its_own() {
+        let ours = RenderSettings::default();
+        let changed: Vec<RenderSettings> = METHODS
+            .iter()
+            .map(|method| {
+                let mut settings = ours;
+                (method.apply)(&mut settings);
+                assert_eq!(settings == ours, method.name == OURS, "{}", method.name);
+                settings
+            })
+            .collect();
+        for (i, a) in changed.iter().enumerate() {
+            assert!(!changed[..i].contains(a), "{} is there twice", METHODS[i].name);
+        }
+    }
+}
