@@ -33,6 +33,7 @@ pub struct Cli {
 
 /// Everything but the window.
 #[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "made once, by clap")]
 pub enum Command {
     /// Render to a file, without a window
     Render(RenderArgs),

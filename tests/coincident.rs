@@ -1,4 +1,5 @@
 //! Faces in the same place: the lowest index wins, whatever the order of work.
+#![allow(clippy::duplicate_mod, reason = "two of the modules below use the same random numbers")]
 
 #[path = "support/geometry.rs"]
 mod geometry;

@@ -1,4 +1,5 @@
 //! What a hit is made into: normals of slivers and of placed spheres, narrow gaps, pictures without a NaN.
+#![allow(clippy::duplicate_mod, reason = "two of the modules below use the same random numbers")]
 
 #[path = "support/alone.rs"]
 mod alone;

@@ -28,6 +28,18 @@ pub trait Accept {
     fn takes(&self, ray: usize, hit: &Hit) -> bool;
 }
 
+/// A function asks about all.
+impl<F: Fn(usize, &Hit) -> bool> Accept for F {
+    #[inline(always)]
+    fn asks(&self, _: u32) -> bool {
+        true
+    }
+    #[inline(always)]
+    fn takes(&self, ray: usize, hit: &Hit) -> bool {
+        self(ray, hit)
+    }
+}
+
 /// Which hits count.
 pub(super) trait Filter: Copy {
     /// All do: nothing needs to be asked.

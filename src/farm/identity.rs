@@ -3,7 +3,7 @@
 use super::Fingerprint;
 use crate::scene::Filter;
 use crate::sync::RenderOrigin;
-use crate::trace::{Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use crate::trace::{Coverage, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,8 @@ pub struct Identity {
     pub max_depth: u32,
     /// `file`, `nearest` or `bilinear`.
     pub filter: String,
+    /// How random numbers are spread: over the samples, and over the places in a pixel.
+    pub sampling: String,
     /// Seed of the samples.
     pub seed: u32,
 }
@@ -43,6 +45,7 @@ impl Identity {
         let arrays = TraceScene {
             geometry: world.resource::<Geometry>(),
             surfaces: world.resource::<Surfaces>(),
+            coverage: world.resource::<Coverage>(),
             lights: world.resource::<Lights>(),
             viewpoint,
             settings,
@@ -64,6 +67,12 @@ impl Identity {
                 Some(Filter::Nearest) => "nearest".to_owned(),
                 Some(Filter::Bilinear) => "bilinear".to_owned(),
             },
+            sampling: format!(
+                "{:?}, {:?}",
+                settings.sampling,
+                settings.pixel_sampling.unwrap_or(settings.sampling)
+            )
+            .to_lowercase(),
             seed: settings.seed,
         }
     }
@@ -81,6 +90,7 @@ impl Identity {
                 ("integrator", id.integrator.clone()),
                 ("max depth", id.max_depth.to_string()),
                 ("texture filter", id.filter.clone()),
+                ("sampling", id.sampling.clone()),
                 ("seed", id.seed.to_string()),
             ]
         };

@@ -8,7 +8,7 @@ use crate::image::compare::{Difference, LinearImage};
 use crate::image::files::linear_pixels;
 use crate::trace::noise::relative_noise;
 use crate::trace::{
-    Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
+    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
 };
 use glam::Vec3;
 use serde::Serialize;
@@ -88,6 +88,7 @@ pub fn traceable<'a>(app: &'a App, settings: &'a RenderSettings) -> TraceScene<'
     TraceScene {
         geometry: app.world.resource::<Geometry>(),
         surfaces: app.world.resource::<Surfaces>(),
+        coverage: app.world.resource::<Coverage>(),
         lights: app.world.resource::<Lights>(),
         viewpoint: app.world.resource::<Viewpoint>(),
         settings,

@@ -192,11 +192,14 @@ mod tests {
         let mut counter = 0;
         let nonsense: [(&str, Convergence); 6] = [
             ("constant", watch(1000, |_| 0.1)),
-            ("rising", watch(1000, |n| n.sqrt())),
+            ("rising", watch(1000, f64::sqrt)),
             ("zero", watch(1000, |_| 0.0)),
             ("no number", watch(1000, |_| f64::NAN)),
             ("noise", watch(1000, |_| 1.5 + jitter(&mut counter))),
-            ("steps", watch(1000, |n| if (n.log2() as u32) % 2 == 0 { 1.0 } else { 0.4 } * n.powf(-0.5))),
+            (
+                "steps",
+                watch(1000, |n| if (n.log2() as u32).is_multiple_of(2) { 1.0 } else { 0.4 } * n.powf(-0.5)),
+            ),
         ];
         for (name, convergence) in nonsense {
             assert_eq!(convergence.samples_to(1e-3), None, "{name}: {:?}", convergence.law());
@@ -218,7 +221,7 @@ mod tests {
         let mut looks = Vec::new();
         while n < u32::MAX - 2 {
             let next = next_look(n);
-            assert!(next > n && (next % 2 == 0 || next == 1));
+            assert!(next > n && (next.is_multiple_of(2) || next == 1));
             assert!(n < 2 || f64::from(next) <= f64::from(n) * 1.125 + 2.0, "{n} {next}");
             looks.push(next);
             n = next;

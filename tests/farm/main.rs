@@ -60,6 +60,7 @@ fn header(size: UVec2, planned: Option<Range<u32>>) -> Header {
         integrator: "path".to_owned(),
         max_depth: 8,
         filter: "file".to_owned(),
+        sampling: "sobol, sobol".into(),
         seed: 0,
     };
     Header::new(identity, planned, &Display::default())
@@ -78,7 +79,7 @@ fn made_up(size: UVec2, planned: Option<Range<u32>>, ranges: impl Fn(usize) -> R
                 rng.bits();
                 let radiance = Vec3::new(rng.unit(), rng.decades(-8.0, 8.0), 1.0 / (1.0 + sample as f32));
                 // Now and then a sample is no number.
-                let radiance = if rng.bits() % 64 == 0 { radiance * f32::NAN } else { radiance };
+                let radiance = if rng.bits().is_multiple_of(64) { radiance * f32::NAN } else { radiance };
                 dropped += u64::from(!pixel.add(sample, radiance));
             }
         }

@@ -78,7 +78,7 @@ fn dot(p: &Whole, q: &Whole) -> BigInt {
 /// (px - sx pz) (qy - sy qz) - (py - sy pz) (qx - sx qz). Its products' sizes are
 /// (|px| + |sx pz|) (|qy| + |sy qz|) + (|py| + |sy pz|) (|qx| + |sx qz|).
 pub fn truth(ray: &Ray, corners: &[Vec3; 3]) -> Truth {
-    let unit_of = |points: &[Vec3]| points.iter().flat_map(|p| p.to_array()).map(lowest_bit).min().unwrap();
+    let unit_of = |points: &[Vec3]| points.iter().flat_map(Vec3::to_array).map(lowest_bit).min().unwrap();
     let unit = unit_of(&[ray.origin, corners[0], corners[1], corners[2]]).min(0);
     let step = unit_of(&[ray.direction]);
     let at = |p: Vec3, unit: i32| p.to_array().map(|x| whole(x, unit));
@@ -90,7 +90,7 @@ pub fn truth(ray: &Ray, corners: &[Vec3; 3]) -> Truth {
     let (along, height) = (dot(&normal, &direction), dot(&normal, a));
     let has = |sign: Sign| edges.iter().any(|e| e.sign() == sign);
     let parallel = along.sign() == Sign::NoSign;
-    let inside = !parallel && !(has(Sign::Plus) && has(Sign::Minus));
+    let inside = !(parallel || has(Sign::Plus) && has(Sign::Minus));
     let t = if parallel { f64::NAN } else { quotient(&height, &along) * f64::from(unit - step).exp2() };
 
     let scaled =
