@@ -9,7 +9,9 @@ use super::triangle::{Edges, Shear, TriangleHit, within};
 use super::wide::{MAX_LEAF, Part, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
+use rayon::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// For a leaf of n triangles nine rows of n floats, without gaps: all first corners' x, their y, their z,
 /// then those of the second and the third corners. So a leaf is as compact as its triangles, and a
@@ -17,7 +19,8 @@ use std::ops::ControlFlow;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Leaves {
     rows: Vec<f32>,
-    ids: Vec<u32>,
+    /// [`WideBvh::prims`].
+    ids: Arc<[u32]>,
 }
 
 /// Decides which hits count.
@@ -77,12 +80,25 @@ impl<A: Accept> Filter for Only<'_, A> {
     }
 }
 
-/// Writes the rows of a part of the leaves: those of the entries from `first` on, whose triangles are `ids`.
-pub(super) fn fill(part: &Part, first: usize, ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) {
-    for (start, count) in part.leaves() {
-        let start = start - first;
-        fill_leaf(&ids[start..start + count], &mut rows[start * 9..(start + count) * 9], triangles);
+/// The rows of all leaves, whose triangles are `ids`, of the hierarchy that `parts` are in turn.
+pub(super) fn rows(parts: &[&Part], ids: &[u32], triangles: &[[Vec3; 3]]) -> Vec<f32> {
+    // A leaf's last vector may reach beyond its own rows. Zeroed memory comes when it is touched.
+    let mut rows = vec![0.0; ids.len() * 9 + MAX_LEAF];
+    let (mut rest, mut first) = (&mut *rows, 0);
+    let mut places = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (own, others) = rest.split_at_mut(part.entries() * 9);
+        places.push((part, first, own));
+        first += part.entries();
+        rest = others;
     }
+    places.into_par_iter().for_each(|(part, from, rows)| {
+        for (first, count) in part.leaves() {
+            let own = &mut rows[(first - from) * 9..][..count * 9];
+            fill_leaf(&ids[first..first + count], own, triangles);
+        }
+    });
+    rows
 }
 
 /// Writes the rows of one leaf.
@@ -98,9 +114,9 @@ pub(super) fn fill_leaf(ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) 
 }
 
 impl Leaves {
-    /// With rows that [`fill`] has filled.
+    /// With rows that [`rows`] has made.
     pub fn new(wide: &WideBvh, rows: Vec<f32>) -> Self {
-        Self { rows, ids: wide.prims.clone() }
+        Self { rows, ids: Arc::clone(&wide.prims) }
     }
 
     /// Those of one leaf.

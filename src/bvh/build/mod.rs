@@ -8,7 +8,7 @@ pub(super) use binned::Subtree;
 pub use check::Defect;
 
 use super::{Aabb, WideBvh, leaves, wide};
-use binned::{Output, Prim};
+use binned::Prim;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use wide::Part;
@@ -78,17 +78,10 @@ pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     if prims.is_empty() {
         return (WideBvh::default(), Vec::new());
     }
-    let mut order = vec![0; prims.len()];
-    // A leaf's last vector may reach beyond its own rows.
-    let mut rows = vec![0.0; prims.len() * 9 + wide::MAX_LEAF];
-    let output = Output { first: 0, order: &mut order, rows: &mut rows[..prims.len() * 9] };
-    let tree = binned::build(prims, MAX_LEAF, output, &|nodes, output| {
-        let part = Part::new(&nodes, wide::MAX_LEAF);
-        leaves::fill(&part, output.first, output.order, output.rows, triangles);
-        part
-    });
-    let wide = wide::join(tree, order);
-    (wide, rows)
+    // The boxes are gone before there are corners, which is what keeps the most memory ever needed low.
+    let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF));
+    let rows = leaves::rows(&tree.parts(), &order, triangles);
+    (wide::join(tree, order), rows)
 }
 
 /// Judged in double precision, where differences and products of f32 are exact or nearly so.
