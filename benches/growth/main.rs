@@ -104,7 +104,7 @@ fn table(growth: &Growth) {
         let Point { triangles, bytes, peak_bytes, .. } = point;
         println!(
             "| {triangles} | {one:.3} ms | {two:.3} ms | {bytes:.0} | {peak_bytes:.0} \
-             | {primary:.1} | {shadow:.1} | {bounce:.1} |"
+             | {primary:.2} | {shadow:.2} | {bounce:.2} |"
         );
     }
 }

@@ -40,7 +40,7 @@ const PANELS: [Panel; 3] = [
     Panel {
         title: "million rays a second, 1 thread",
         lines: &[("primary", |p| p.rays[0]), ("shadow", |p| p.rays[1]), ("bounce", |p| p.rays[2])],
-        range: (-0.5, 2.0),
+        range: (-1.3, 2.4),
     },
 ];
 
@@ -95,8 +95,8 @@ where
         .axis_style(INK.mix(0.6))
         .label_style(text(13.0))
         .x_desc("triangles")
-        .x_label_formatter(&tick)
-        .y_label_formatter(&tick)
+        .x_label_formatter(&|&place| count(place))
+        .y_label_formatter(&|&place| tick(place))
         .draw()?;
     let mut keys = Vec::new();
     for (number, growth) in all.iter().enumerate() {
@@ -127,13 +127,15 @@ where
     Ok(())
 }
 
+/// The number of triangles at a logarithm.
+fn count(place: f64) -> String {
+    let number = 10f64.powf(place).round();
+    if number < 1e6 { format!("{}k", number / 1e3) } else { format!("{}M", number / 1e6) }
+}
+
 /// The number at a logarithm.
-fn tick(place: &f64) -> String {
-    let number = 10f64.powf(*place);
-    let exponent = (place + 1e-9).floor() as i32;
-    match exponent {
-        0..=3 => format!("{number:.0}"),
-        -3..0 => format!("{number:.*}", exponent.unsigned_abs() as usize),
-        _ => format!("{number:.0e}"),
-    }
+fn tick(place: f64) -> String {
+    // A hair more: the logarithm of 0.001 may be just below −3.
+    let digits = -(place + 1e-9).floor();
+    format!("{:.*}", digits.max(0.0) as usize, 10f64.powf(place))
 }
