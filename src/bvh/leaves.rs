@@ -6,7 +6,7 @@ use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit, within};
-use super::wide::{MAX_LEAF, Part, WideBvh};
+use super::wide::{MAX_LEAF, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -80,21 +80,24 @@ impl<A: Accept> Filter for Only<'_, A> {
     }
 }
 
-/// The rows of all leaves, whose triangles are `ids`, of the hierarchy that `parts` are in turn.
-pub(super) fn rows(parts: &[&Part], ids: &[u32], triangles: &[[Vec3; 3]]) -> Vec<f32> {
+/// The rows of all `leaves`, given by first entry and number of entries, whose triangles are `ids`. Each list
+/// is about all entries from the end of the last one on.
+pub(super) fn rows(leaves: Vec<Vec<[u32; 2]>>, ids: &[u32], triangles: &[[Vec3; 3]]) -> Vec<f32> {
     // A leaf's last vector may reach beyond its own rows. Zeroed memory comes when it is touched.
     let mut rows = vec![0.0; ids.len() * 9 + MAX_LEAF];
-    let (mut rest, mut first) = (&mut *rows, 0);
-    let mut places = Vec::with_capacity(parts.len());
-    for part in parts {
-        let (own, others) = rest.split_at_mut(part.entries() * 9);
-        places.push((part, first, own));
-        first += part.entries();
+    let (mut rest, mut start) = (&mut *rows, 0);
+    let mut places = Vec::with_capacity(leaves.len());
+    for list in leaves {
+        let entries = list.iter().map(|[_, count]| *count as usize).sum::<usize>();
+        let (own, others) = rest.split_at_mut(entries * 9);
+        places.push((list, start, own));
+        start += entries;
         rest = others;
     }
-    places.into_par_iter().for_each(|(part, from, rows)| {
-        for (first, count) in part.leaves() {
-            let own = &mut rows[(first - from) * 9..][..count * 9];
+    places.into_par_iter().for_each(|(list, start, rows)| {
+        for [first, count] in list {
+            let (first, count) = (first as usize, count as usize);
+            let own = &mut rows[(first - start) * 9..][..count * 9];
             fill_leaf(&ids[first..first + count], own, triangles);
         }
     });

@@ -135,18 +135,14 @@ impl Part {
         Self { nodes, root, cost: plans[0].cost[0], child }
     }
 
-    /// The number of entries.
-    pub fn entries(&self) -> usize {
-        self.root.count as usize
-    }
-
-    /// All leaves.
-    pub fn leaves(&self) -> impl Iterator<Item = (usize, usize)> {
+    /// First entry and number of entries of all leaves.
+    pub fn leaf_list(&self) -> Vec<[u32; 2]> {
         let alone = match self.child {
             Child::Leaf { first, count } => Some((first, count)),
             Child::Node(_) => None,
         };
-        alone.into_iter().chain(self.nodes.iter().flat_map(WideNode::leaves))
+        let all = alone.into_iter().chain(self.nodes.iter().flat_map(WideNode::leaves));
+        all.map(|(first, count)| [first as u32, count as u32]).collect()
     }
 }
 

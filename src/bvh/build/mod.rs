@@ -78,10 +78,13 @@ pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     if prims.is_empty() {
         return (WideBvh::default(), Vec::new());
     }
-    // The boxes are gone before there are corners, which is what keeps the most memory ever needed low.
+    // The boxes are gone, and nodes only once there, before there are corners: so the most memory that is ever
+    // needed is that of the boxes.
     let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF));
-    let rows = leaves::rows(&tree.parts(), &order, triangles);
-    (wide::join(tree, order), rows)
+    let leaves = tree.parts().into_par_iter().map(Part::leaf_list).collect();
+    let wide = wide::join(tree, order);
+    let rows = leaves::rows(leaves, &wide.prims, triangles);
+    (wide, rows)
 }
 
 /// Judged in double precision, where differences and products of f32 are exact or nearly so.
