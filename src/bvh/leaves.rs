@@ -6,10 +6,12 @@ use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
 use super::simd::{Lanes, Mask, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit, within};
-use super::wide::{MAX_LEAF, Part, WideBvh};
+use super::wide::{MAX_LEAF, WideBvh};
 use super::{Hit, Probe};
 use glam::Vec3;
+use rayon::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// For a leaf of n triangles nine rows of n floats, without gaps: all first corners' x, their y, their z,
 /// then those of the second and the third corners. So a leaf is as compact as its triangles, and a
@@ -17,7 +19,8 @@ use std::ops::ControlFlow;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Leaves {
     rows: Vec<f32>,
-    ids: Vec<u32>,
+    /// [`WideBvh::prims`].
+    ids: Arc<[u32]>,
 }
 
 /// Decides which hits count.
@@ -89,12 +92,28 @@ impl<A: Accept> Filter for Only<'_, A> {
     }
 }
 
-/// Writes the rows of a part of the leaves: those of the entries from `first` on, whose triangles are `ids`.
-pub(super) fn fill(part: &Part, first: usize, ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) {
-    for (start, count) in part.leaves() {
-        let start = start - first;
-        fill_leaf(&ids[start..start + count], &mut rows[start * 9..(start + count) * 9], triangles);
+/// The rows of all `leaves`, given by first entry and number of entries, whose triangles are `ids`. Each list
+/// is about all entries from the end of the last one on.
+pub(super) fn rows(leaves: Vec<Vec<[u32; 2]>>, ids: &[u32], triangles: &[[Vec3; 3]]) -> Vec<f32> {
+    // A leaf's last vector may reach beyond its own rows. Zeroed memory comes when it is touched.
+    let mut rows = vec![0.0; ids.len() * 9 + MAX_LEAF];
+    let (mut rest, mut start) = (&mut *rows, 0);
+    let mut places = Vec::with_capacity(leaves.len());
+    for list in leaves {
+        let entries = list.iter().map(|[_, count]| *count as usize).sum::<usize>();
+        let (own, others) = rest.split_at_mut(entries * 9);
+        places.push((list, start, own));
+        start += entries;
+        rest = others;
     }
+    places.into_par_iter().for_each(|(list, start, rows)| {
+        for [first, count] in list {
+            let (first, count) = (first as usize, count as usize);
+            let own = &mut rows[(first - start) * 9..][..count * 9];
+            fill_leaf(&ids[first..first + count], own, triangles);
+        }
+    });
+    rows
 }
 
 /// Writes the rows of one leaf.
@@ -110,9 +129,9 @@ pub(super) fn fill_leaf(ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) 
 }
 
 impl Leaves {
-    /// With rows that [`fill`] has filled.
+    /// With rows that [`rows`] has made.
     pub fn new(wide: &WideBvh, rows: Vec<f32>) -> Self {
-        Self { rows, ids: wide.prims.clone() }
+        Self { rows, ids: Arc::clone(&wide.prims) }
     }
 
     /// Those of one leaf.

@@ -8,6 +8,7 @@ use super::build::{MAX_DEPTH, Subtree};
 use super::{Aabb, Bvh, Defect, Node};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Children of a node.
 pub const WIDTH: usize = 8;
@@ -76,14 +77,14 @@ pub struct WideBvh {
     /// The root first. Empty if there is nothing to find.
     pub nodes: Vec<WideNode>,
     /// Indices of what it was built over, in the order of the leaves.
-    pub prims: Vec<u32>,
+    pub prims: Arc<[u32]>,
     /// Around everything.
     pub bounds: Aabb,
 }
 
 impl Default for WideBvh {
     fn default() -> Self {
-        Self { nodes: Vec::new(), prims: Vec::new(), bounds: Aabb::EMPTY }
+        Self { nodes: Vec::new(), prims: Arc::default(), bounds: Aabb::EMPTY }
     }
 }
 
@@ -134,13 +135,24 @@ impl Part {
         Self { nodes, root, cost: plans[0].cost[0], child }
     }
 
-    /// All leaves.
-    pub fn leaves(&self) -> impl Iterator<Item = (usize, usize)> {
+    /// First entry and number of entries of all leaves.
+    pub fn leaf_list(&self) -> Vec<[u32; 2]> {
         let alone = match self.child {
             Child::Leaf { first, count } => Some((first, count)),
             Child::Node(_) => None,
         };
-        alone.into_iter().chain(self.nodes.iter().flat_map(WideNode::leaves))
+        let all = alone.into_iter().chain(self.nodes.iter().flat_map(WideNode::leaves));
+        all.map(|(first, count)| [first as u32, count as u32]).collect()
+    }
+}
+
+impl<T> Subtree<T> {
+    /// One thread's shares, in the order of the leaves.
+    pub fn parts(&self) -> Vec<&T> {
+        match self {
+            Self::Done(part) => vec![part],
+            Self::Inner(_, children) => children.iter().flat_map(Self::parts).collect(),
+        }
     }
 }
 
@@ -206,7 +218,7 @@ pub(super) fn join(tree: Subtree<Part>, prims: Vec<u32>) -> WideBvh {
             }
         }
     });
-    WideBvh { nodes, prims, bounds }
+    WideBvh { nodes, prims: prims.into(), bounds }
 }
 
 const EMPTY_BINARY: Node = Node { min: Vec3::ZERO, first: 0, max: Vec3::ZERO, count: 0 };

@@ -116,40 +116,34 @@ pub(in crate::bvh) enum Subtree<T> {
     Inner(Node, Box<[Self; 2]>),
 }
 
-/// What subtrees are written to, each to its own part: for each prim its index, and, unless there are
-/// none, a number of floats.
-pub(super) struct Output<'a> {
+/// Where a subtree's prims go: for each its index, in the order of the leaves.
+struct Order<'a> {
     /// Of the first prim among all.
-    pub first: usize,
-    /// The prims' indices in the order of the leaves.
-    pub order: &'a mut [u32],
-    /// For whoever finishes the subtree.
-    pub rows: &'a mut [f32],
+    first: usize,
+    order: &'a mut [u32],
 }
 
-impl Output<'_> {
+impl Order<'_> {
     fn split(self, middle: usize) -> (Self, Self) {
-        let per_prim = self.rows.len() / self.order.len();
-        let (order, right_order) = self.order.split_at_mut(middle);
-        let (rows, right_rows) = self.rows.split_at_mut(per_prim * middle);
-        let right = Self { first: self.first + middle, order: right_order, rows: right_rows };
-        (Self { first: self.first, order, rows }, right)
+        let (order, right) = self.order.split_at_mut(middle);
+        (Self { first: self.first, order }, Self { first: self.first + middle, order: right })
     }
 }
 
-/// Builds over `prims`, at least one, at most `max_leaf` to a leaf unless they cannot be told apart. `finish`
-/// gets the nodes of each subtree that one thread built, numbered from its root; their leaves' `first` are
-/// among all prims.
+/// Builds over `prims`, at least one, at most `max_leaf` to a leaf unless they cannot be told apart; also
+/// returns their indices in the order of the leaves. `finish` gets the nodes of each subtree that one thread
+/// built, numbered from its root; their leaves' `first` are among all prims.
 pub(super) fn build<T: Send>(
     mut prims: Vec<Prim>,
     max_leaf: usize,
-    output: Output,
-    finish: &(impl Fn(Vec<Node>, Output) -> T + Sync),
-) -> Subtree<T> {
+    finish: &(impl Fn(Vec<Node>) -> T + Sync),
+) -> (Subtree<T>, Vec<u32>) {
     let extent = prims.par_chunks(PIECE).map(Extent::of).reduce(|| Extent::EMPTY, Extent::union);
     // Zeroed memory comes when it is touched, by the thread that does.
     let mut spare = bytemuck::zeroed_vec(prims.len());
-    large(&mut prims, &mut spare, output, extent, max_leaf, 0, finish)
+    let mut order = vec![0; prims.len()];
+    let all = Order { first: 0, order: &mut order };
+    (large(&mut prims, &mut spare, all, extent, max_leaf, 0, finish), order)
 }
 
 /// The same without threads' shares.
@@ -157,9 +151,7 @@ pub(super) fn build_binary(prims: Vec<Prim>, max_leaf: usize) -> Bvh {
     if prims.is_empty() {
         return Bvh::default();
     }
-    let mut order = vec![0; prims.len()];
-    let output = Output { first: 0, order: &mut order, rows: &mut [] };
-    let tree = build(prims, max_leaf, output, &|nodes, _| nodes);
+    let (tree, order) = build(prims, max_leaf, &|nodes| nodes);
     let mut nodes = vec![Node { min: Vec3::ZERO, first: 0, max: Vec3::ZERO, count: 0 }];
     assemble(tree, 0, &mut nodes);
     Bvh { nodes, prims: order }
@@ -194,22 +186,22 @@ fn assemble(tree: Subtree<Vec<Node>>, slot: usize, nodes: &mut Vec<Node>) {
 fn large<T: Send>(
     prims: &mut [Prim],
     spare: &mut [Prim],
-    output: Output,
+    order: Order,
     extent: Extent,
     max_leaf: usize,
     depth: usize,
-    finish: &(impl Fn(Vec<Node>, Output) -> T + Sync),
+    finish: &(impl Fn(Vec<Node>) -> T + Sync),
 ) -> Subtree<T> {
     if prims.len() < TASK {
         let mut nodes = Vec::with_capacity(prims.len());
         nodes.push(leaf(&extent, 0, 0));
-        small(prims, spare, &mut *output.order, output.first, &extent, max_leaf, depth, 0, &mut nodes);
-        return Subtree::Done(finish(nodes, output));
+        small(prims, spare, order.order, order.first, &extent, max_leaf, depth, 0, &mut nodes);
+        return Subtree::Done(finish(nodes));
     }
     let (middle, extents) = part(prims, spare, &extent, depth);
     let (left, right) = spare.split_at_mut(middle);
     let (left_spare, right_spare) = prims.split_at_mut(middle);
-    let (left_output, right_output) = output.split(middle);
+    let (left_output, right_output) = order.split(middle);
     let [left_extent, right_extent] = extents;
     let (left, right) = rayon::join(
         || large(left, left_spare, left_output, left_extent, max_leaf, depth + 1, finish),

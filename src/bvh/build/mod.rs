@@ -8,7 +8,7 @@ pub(super) use binned::Subtree;
 pub use check::Defect;
 
 use super::{Aabb, WideBvh, leaves, wide};
-use binned::{Output, Prim};
+use binned::Prim;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use wide::Part;
@@ -78,16 +78,12 @@ pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     if prims.is_empty() {
         return (WideBvh::default(), Vec::new());
     }
-    let mut order = vec![0; prims.len()];
-    // A leaf's last vector may reach beyond its own rows.
-    let mut rows = vec![0.0; prims.len() * 9 + wide::MAX_LEAF];
-    let output = Output { first: 0, order: &mut order, rows: &mut rows[..prims.len() * 9] };
-    let tree = binned::build(prims, MAX_LEAF, output, &|nodes, output| {
-        let part = Part::new(&nodes, wide::MAX_LEAF);
-        leaves::fill(&part, output.first, output.order, output.rows, triangles);
-        part
-    });
+    // The boxes are gone, and nodes only once there, before there are corners: so the most memory that is ever
+    // needed is that of the boxes.
+    let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF));
+    let leaves = tree.parts().into_par_iter().map(Part::leaf_list).collect();
     let wide = wide::join(tree, order);
+    let rows = leaves::rows(leaves, &wide.prims, triangles);
     (wide, rows)
 }
 
