@@ -8,6 +8,7 @@ use geometry::{Rng, aimed_ray, boxes, brute_force, check, soup};
 use glam::Vec3;
 use penumbra::bvh::wide::{Child, WIDTH};
 use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Node, WideBvh};
+use std::sync::Arc;
 
 /// A square of 3200 triangles, none of them long or steep enough to be split.
 fn wave() -> Vec<[Vec3; 3]> {
@@ -179,10 +180,10 @@ fn the_checker_finds_a_part_that_is_missing() {
     assert!(check(&blas, &other).is_err_and(|why| why.contains("is in no leaf")));
     for entry in 0..parts {
         let mut broken = blas.hierarchy().clone();
-        broken.prims[entry] = 1;
+        Arc::make_mut(&mut broken.prims)[entry] = 1;
         assert!(check_hierarchy(&broken, &other).is_err(), "entry {entry}");
     }
     let mut broken = blas.hierarchy().clone();
-    broken.prims[0] = 7;
+    Arc::make_mut(&mut broken.prims)[0] = 7;
     assert!(check_hierarchy(&broken, &needle).is_err());
 }

@@ -35,6 +35,10 @@ pub(super) struct Shear<V> {
 /// the distance is measured again in double precision. [`super::probe::SLACK`] follows from it.
 pub(super) const THIN: f32 = 1.0 / 8.0;
 
+/// And of triangles whose shadow has so little area (twice it is less) that products are cut off at the end of
+/// single precision's range, or a reciprocal is beyond it.
+const TINY: f32 = 1e-30;
+
 /// Where rays pass the edges of triangles.
 #[derive(Clone, Copy)]
 pub(super) struct Edges<V> {
@@ -98,7 +102,7 @@ impl<V: Lanes> Shear<V> {
         let near = t.le(cancels).and(surely_behind.le(t));
         let [a, b, c] = edges.offsets;
         let [x, y, _] = three!(|i| a[i % 2].abs().max(b[i % 2].abs()).max(c[i % 2].abs()));
-        let least = x * y * V::splat(proof, THIN);
+        let least = (x * y * V::splat(proof, THIN)).max(V::splat(proof, TINY));
         let area = determinant.abs();
         let ahead = cancels.lt(t).and(least.le(area));
         Distance { t, inverse_determinant, ahead, doubtful: near.or(area.lt(least)), on_edge }
@@ -137,7 +141,11 @@ impl Probe {
             return None;
         }
         if edges.weights.iter().any(|&w| w.get() == 0.0) {
-            edges.weights = self.exact_weights(corners)?.map(one);
+            let weights = self.exact_weights(corners)?;
+            if weights.iter().sum::<f64>().abs() < f64::from(TINY) {
+                return self.doubtful_triangle(corners, t_max);
+            }
+            edges.weights = weights.map(|w| one(w as f32));
         }
         let distance = shear.distance(Plain, &edges);
         if distance.doubtful.bits() != 0 {
@@ -188,16 +196,16 @@ impl Probe {
     /// The edge functions of the sheared corners in double precision, where their products are exact;
     /// `None` if the ray passes outside, or in the plane.
     #[cold]
-    fn exact_weights(&self, corners: &[Vec3; 3]) -> Option<[f32; 3]> {
+    fn exact_weights(&self, corners: &[Vec3; 3]) -> Option<[f64; 3]> {
         let [x, y, z] = AXES[self.axis];
         let [a, b, c] = corners.map(|p| {
             let p = p - self.origin;
             (f64::from(p[x] - self.shear.x * p[z]), f64::from(p[y] - self.shear.y * p[z]))
         });
-        let edge = |p: (f64, f64), q: (f64, f64)| (p.0 * q.1 - p.1 * q.0) as f32;
+        let edge = |p: (f64, f64), q: (f64, f64)| p.0 * q.1 - p.1 * q.0;
         let weights = [edge(c, b), edge(a, c), edge(b, a)];
         let outside = weights.iter().any(|&w| w < 0.0) && weights.iter().any(|&w| w > 0.0);
-        (!outside && weights.iter().sum::<f32>() != 0.0).then_some(weights)
+        (!outside && weights.iter().sum::<f64>() != 0.0).then_some(weights)
     }
 
     /// The same in double precision, for coordinates whose products overflow or vanish.
