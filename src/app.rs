@@ -7,7 +7,8 @@ use crate::scene::propagate_transforms;
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
-    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
+    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, allot,
+    trace_pass,
 };
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
@@ -44,6 +45,8 @@ pub struct FrameBudget {
     /// Raised from outside to end refinement at the next tile (a key was pressed). The frame's
     /// runner lowers it. A preview, once begun, always completes.
     pub interrupt: Arc<AtomicBool>,
+    /// More samples go where there is more noise.
+    pub adaptive: bool,
     /// Samples per pixel after which nothing more is traced.
     pub sample_target: u32,
     /// Samples per pixel of one pass, if there is no time limit.
@@ -55,7 +58,14 @@ pub struct FrameBudget {
 
 impl Default for FrameBudget {
     fn default() -> Self {
-        Self { time: None, interrupt: Arc::default(), sample_target: 64, pass_samples: 1, preview: false }
+        Self {
+            time: None,
+            interrupt: Arc::default(),
+            adaptive: false,
+            sample_target: 64,
+            pass_samples: 1,
+            preview: false,
+        }
     }
 }
 
@@ -225,7 +235,6 @@ pub fn trace_frame(
     };
     // Sample indices end with u32: nobody waits for those beyond.
     let target = budget.sample_target.min(u32::MAX - film.first_sample());
-    let until = film.first_sample() + target;
     let mut start = Instant::now();
     let mut seconds = 0.0;
     let mut rays = RayCounts::default();
@@ -238,8 +247,7 @@ pub fn trace_frame(
                 Some(counts) => rays = rays + counts,
                 // So cheap that the film's own first pass is the preview.
                 None => {
-                    let once = until.min(film.first_sample() + 1);
-                    rays = rays + trace_pass(&scene, &mut film, once, 1, || true);
+                    rays = rays + trace_pass(&scene, &mut film, target.min(1), 1, || true);
                     preview.note(start.elapsed(), f64::from(settings.size.element_product()));
                 }
             }
@@ -250,7 +258,15 @@ pub fn trace_frame(
     let in_time = || budget.time.is_none_or(|time| start.elapsed() < time);
     let keep_going = || in_time() && !budget.interrupt.load(Ordering::Relaxed);
     while film.complete_samples() < target && keep_going() {
+        let even = budget.adaptive && !film.is_allotted();
+        let until = if even { allot::EVEN.min(target) } else { target };
         rays = rays + trace_pass(&scene, &mut film, until, budget.pass_samples, keep_going);
+        if even
+            && film.complete_samples() == allot::EVEN
+            && let Some(shares) = allot::shares(&film)
+        {
+            film.allot(&shares);
+        }
         if budget.time.is_none() {
             break;
         }

@@ -185,8 +185,11 @@ pub fn render(
     let first_sample = app.world.resource::<Film>().first_sample();
     let target = target.min(u32::MAX - first_sample);
 
-    app.world
-        .insert_resource(FrameBudget { interrupt: Arc::clone(&job.interrupt), ..FrameBudget::default() });
+    app.world.insert_resource(FrameBudget {
+        adaptive: open_end && asked.is_none() && !films,
+        interrupt: Arc::clone(&job.interrupt),
+        ..FrameBudget::default()
+    });
     let tracing = Instant::now();
     let mut watch = Watch::new(job.noise, log, app.world.resource::<Film>().complete_samples());
     let mut first_picture_seconds = None;

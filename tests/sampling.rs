@@ -111,7 +111,7 @@ fn sampler_against_density(
 const POINT: Vec3 = Vec3::new(0.2, -0.1, 0.05);
 
 fn shape(shape: Shape) -> ShapeLight {
-    ShapeLight { shape, radiance: [Vec3::ONE; 4], two_sided: true, visible: true }
+    ShapeLight::new(shape, [Vec3::ONE; 4], true, true)
 }
 
 /// What a ray toward `wi` finds the density to be.

@@ -56,6 +56,12 @@ impl Placement {
         &self.world_from_local
     }
 
+    /// Whether it is where its mesh is.
+    #[must_use]
+    pub fn is_identity(&self) -> bool {
+        self.identity
+    }
+
     /// Its inverse.
     #[must_use]
     pub fn local_from_world(&self) -> &DAffine3 {

@@ -58,7 +58,7 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
         let visible = visible.is_none_or(|v| v.0);
         let area = shape.area();
         let emits = radiance != [Vec3::ZERO; 4];
-        let light = ShapeLight { shape, radiance, two_sided, visible };
+        let light = ShapeLight::new(shape, radiance, two_sided, visible);
         (area > 0.0 && area.is_finite() && emits).then_some(FlatLight::Shape(light))
     };
     match *light {

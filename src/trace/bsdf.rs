@@ -126,6 +126,9 @@ impl Bsdf {
             return [Vec3::ZERO; 2];
         }
         let lambert = self.diffuse * (n_dot_l / PI);
+        if matches!(self.glossy, Lobe::None) {
+            return [lambert, Vec3::ZERO];
+        }
         let Some(h) = (wo + wi).try_normalize() else { return [lambert, Vec3::ZERO] };
         let n_dot_h = self.normal.dot(h).max(0.0);
         let v_dot_h = wo.dot(h).clamp(0.0, 1.0);
@@ -153,7 +156,7 @@ impl Bsdf {
     pub fn pdf(&self, wo: Vec3, wi: Vec3, lobes: Lobes) -> f32 {
         let n_dot_l = self.normal.dot(wi);
         let n_dot_v = self.normal.dot(wo);
-        if n_dot_l <= 0.0 || n_dot_v <= 0.0 {
+        if n_dot_l <= 0.0 || n_dot_v <= 0.0 || !self.has(lobes) {
             return 0.0;
         }
         let shares = self.shares(wo, lobes);

@@ -122,14 +122,18 @@ impl Pixel {
 }
 
 /// A square of the film that one thread works on at a time.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     /// Its top left pixel.
     pub origin: UVec2,
     /// Its size: [`TILE`] except at the right and lower border.
     pub size: UVec2,
-    /// Index of the sample that comes next in each of its pixels.
+    /// Index of the sample that comes next in each of its pixels, but for `more`.
     pub next_sample: u32,
+    /// Samples beyond `next_sample` that the pixels of either colour have (see [`Film::allot`]).
+    pub more: [u32; 2],
+    /// How many they get for each one that the picture gets on average.
+    shares: [f32; 2],
     /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
     pub dropped: u64,
     /// What the pixels hold is from before the last reset.
@@ -138,6 +142,12 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Pixels are coloured as a chess board; the first of a tile has colour 0.
+    #[must_use]
+    pub fn color(&self, pixel: u32) -> usize {
+        ((pixel % self.size.x + pixel / self.size.x) & 1) as usize
+    }
+
     /// Rows from the top, to look at.
     pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
         self.pixels.iter().map(|pixel| if self.stale { &EMPTY } else { pixel })
@@ -155,10 +165,12 @@ impl Tile {
 static EMPTY: Pixel = Pixel { sums: [[Sum(0); 3]; 2], counts: [0; 2] };
 
 /// The accumulated picture.
-#[derive(Resource, Clone, Debug, PartialEq, Eq)]
+#[derive(Resource, Clone, Debug, PartialEq)]
 pub struct Film {
     size: UVec2,
     first_sample: u32,
+    /// Samples of each pixel from which on [`Film::allot`] gives out shares; 0 if it does not.
+    even_samples: u32,
     tiles: Vec<Tile>,
 }
 
@@ -173,17 +185,28 @@ impl Film {
             .map(|origin| {
                 let size = (size - origin).min(UVec2::splat(TILE));
                 let pixels = vec![Pixel::default(); size.element_product() as usize];
-                Tile { origin, size, next_sample: first_sample, dropped: 0, stale: false, pixels }
+                Tile {
+                    origin,
+                    size,
+                    next_sample: first_sample,
+                    more: [0; 2],
+                    shares: [1.0; 2],
+                    dropped: 0,
+                    stale: false,
+                    pixels,
+                }
             })
             .collect();
-        Self { size, first_sample, tiles }
+        Self { size, first_sample, even_samples: 0, tiles }
     }
 
     /// Forgets all samples, in no time: a tile is cleared when it is next worked on.
     pub fn reset(&mut self) {
         let first_sample = self.first_sample;
+        self.even_samples = 0;
         for tile in &mut self.tiles {
             tile.next_sample = first_sample;
+            (tile.more, tile.shares) = ([0; 2], [1.0; 2]);
             tile.dropped = 0;
             tile.stale = true;
         }
@@ -254,10 +277,43 @@ impl Film {
         })
     }
 
-    /// Samples that every pixel has.
+    /// From now on gives the pixels of each tile and colour their own `shares` of all samples, of mean 1. Every
+    /// pixel must have the same number of samples, one at least.
+    ///
+    /// A picture stays unbiased only if how many samples a pixel gets does not depend on what they say: so
+    /// the share of one colour is to be found from pixels of the other.
+    pub fn allot(&mut self, shares: &[[f32; 2]]) {
+        self.even_samples = self.complete_samples();
+        for (tile, &shares) in self.tiles.iter_mut().zip(shares) {
+            tile.shares = shares;
+        }
+    }
+
+    /// Whether [`Film::allot`] has given out shares.
+    #[must_use]
+    pub fn is_allotted(&self) -> bool {
+        self.even_samples > 0
+    }
+
+    /// What [`Tile::more`] is when the tile has its share of `samples` per pixel.
+    #[must_use]
+    pub fn goal(&self, tile: &Tile, samples: u32) -> [u32; 2] {
+        let beyond = f64::from(samples.saturating_sub(self.even_samples));
+        // Saturates.
+        tile.shares.map(|share| (beyond * f64::from(share)).ceil() as u32)
+    }
+
+    /// Samples that every pixel has its share of.
     #[must_use]
     pub fn complete_samples(&self) -> u32 {
-        self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample
+        let even = self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample;
+        if !self.is_allotted() {
+            return even;
+        }
+        // Shares are rounded up to whole samples; what is missing is rounding of the division.
+        let beyond = |t: &Tile, color: usize| f64::from(t.more[color]) / f64::from(t.shares[color]) + 1e-6;
+        let least = self.tiles.iter().map(|t| beyond(t, 0).min(beyond(t, 1)));
+        even + least.fold(f64::INFINITY, f64::min) as u32
     }
 
     /// Samples a pixel has on average.
@@ -266,7 +322,10 @@ impl Film {
         let sum: f64 = self
             .tiles
             .iter()
-            .map(|t| f64::from(t.next_sample - self.first_sample) * f64::from(t.size.element_product()))
+            .map(|t| {
+                let more = 0.5 * (f64::from(t.more[0]) + f64::from(t.more[1]));
+                (f64::from(t.next_sample - self.first_sample) + more) * f64::from(t.size.element_product())
+            })
             .sum();
         sum / f64::from(self.size.element_product())
     }

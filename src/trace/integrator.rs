@@ -53,6 +53,7 @@ struct Shadow {
 /// Buffers of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Batch {
+    pixels: Vec<(u32, UVec2, [Sampler; 2])>,
     paths: Vec<Path>,
     next: Vec<Path>,
     shadows: Vec<Shadow>,
@@ -74,22 +75,29 @@ const LIGHT: u32 = 4;
 const ROULETTE_DEPTH: u32 = 4;
 
 impl Batch {
-    /// Adds samples `first..first + count` to each pixel of `tile`, for a picture of `size`.
+    /// Adds the next `count` samples to each pixel of `tile`, or to those of one colour, for a picture of `size`.
     pub fn render(
         &mut self,
         scene: &TraceScene,
         tile: &mut Tile,
         size: UVec2,
+        color: Option<usize>,
         count: u32,
         rays: &mut RayCounts,
     ) {
-        let first = tile.next_sample;
+        let first = tile.next_sample + color.map_or(0, |color| tile.more[color]);
         self.paths.clear();
         self.keys.clear();
+        let members =
+            (0..tile.size.element_product()).filter(|&i| color.is_none_or(|color| tile.color(i) == color));
+        self.pixels.clear();
+        self.pixels.extend(members.map(|i| {
+            let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
+            (i, pixel, Sampler::halves(pixel, scene.settings))
+        }));
         for sample in first..first + count {
-            for i in 0..tile.size.element_product() {
-                let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
-                let sampler = Sampler::new(pixel, sample, scene.settings.seed).spread(scene.settings);
+            for &(i, pixel, halves) in &self.pixels {
+                let sampler = halves[sample as usize & 1].at(sample);
                 let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), size);
                 let entry = self.keys.len() as u32;
                 self.keys.push((i, sample));
@@ -117,7 +125,10 @@ impl Batch {
             dropped += u64::from(!pixels[pixel as usize].add(sample, radiance));
         }
         tile.dropped += dropped;
-        tile.next_sample += count;
+        match color {
+            None => tile.next_sample += count,
+            Some(color) => tile.more[color] += count,
+        }
     }
 
     fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
@@ -142,7 +153,9 @@ impl Batch {
     fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
         self.shadows.retain(|shadow| !scene.lights.blocks(&shadow.ray, shadow.light));
         // Rays to one light go similar ways. Stable: the sum of a path does not depend on its neighbours.
-        self.shadows.sort_by_key(|shadow| shadow.light);
+        if scene.lights.len() > 1 {
+            self.shadows.sort_by_key(|shadow| shadow.light);
+        }
         self.rays.clear();
         self.rays.extend(self.shadows.iter().map(|shadow| shadow.ray));
         self.ignored.clear();
@@ -225,7 +238,8 @@ impl Batch {
         if bsdf.has_smooth_lobes() && !scene.lights.is_empty() {
             for index in 0..scene.lights.picks(path.depth) {
                 let pair = index as u32 * 2;
-                let random = path.sampler.pair(base + PICK).x;
+                let by_chance = !scene.lights.samples_all(path.depth);
+                let random = if by_chance { path.sampler.pair(base + PICK).x } else { 0.0 };
                 let pick = scene.lights.pick(path.depth, index, random);
                 let u = path.sampler.pair(base + LIGHT + pair);
                 if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {

@@ -130,7 +130,9 @@ impl Lights {
         if self.samples_all(depth) { 1.0 } else { self.chances[light as usize] }
     }
 
-    fn samples_all(&self, depth: u32) -> bool {
+    /// Whether all lights are sampled at a vertex after `depth` bounces.
+    #[must_use]
+    pub fn samples_all(&self, depth: u32) -> bool {
         self.lights.len() <= if depth == 0 { ALL_LIGHTS } else { 1 }
     }
 

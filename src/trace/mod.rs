@@ -3,6 +3,7 @@
 //! [`pass::trace_pass`] takes the tiles of the [`Film`] one by one; [`integrator`] follows all rays of
 //! a tile together, wave by wave, through [`TraceScene`].
 
+pub mod allot;
 pub mod bsdf;
 pub mod camera;
 pub mod convergence;

@@ -38,9 +38,9 @@ impl std::ops::Add for RayCounts {
 /// pixels a thread's buffers take about 2 MB).
 const BATCH_SAMPLES: u32 = 32;
 
-/// Brings all tiles to sample index `until`, `step` samples at a time, as long as `keep_going`.
+/// Brings all tiles to their share of `until` samples per pixel, `step` samples at a time, as long as `keep_going`.
 ///
-/// It is asked before each tile. Tiles behind the others come first, so that a pass that was broken
+/// It is asked before each batch. Tiles behind the others come first, so that a pass that was broken
 /// off is finished before the next begins. The picture does not depend on the number of threads.
 pub fn trace_pass(
     scene: &TraceScene,
@@ -50,17 +50,25 @@ pub fn trace_pass(
     keep_going: impl Fn() -> bool + Sync,
 ) -> RayCounts {
     let size = film.size();
-    let behind = film.tiles().iter().map(|t| t.next_sample).min().unwrap_or(until);
-    let goal = behind.saturating_add(step.max(1)).min(until);
+    let samples = film.complete_samples().saturating_add(step.max(1)).min(until);
+    let even = (!film.is_allotted()).then(|| film.first_sample().saturating_add(samples));
+    let goals: Vec<[u32; 2]> = film.tiles().iter().map(|tile| film.goal(tile, samples)).collect();
     film.tiles_mut()
         .par_iter_mut()
-        .filter(|tile| tile.next_sample < goal)
-        .map_init(Batch::default, |batch, tile| {
+        .zip(goals)
+        .map_init(Batch::default, |batch, (tile, goals)| {
             let mut rays = RayCounts::default();
-            if keep_going() {
-                while tile.next_sample < goal {
+            if let Some(goal) = even {
+                while tile.next_sample < goal && keep_going() {
                     let count = (goal - tile.next_sample).min(BATCH_SAMPLES);
-                    batch.render(scene, tile, size, count, &mut rays);
+                    batch.render(scene, tile, size, None, count, &mut rays);
+                }
+                return rays;
+            }
+            for (color, goal) in goals.into_iter().enumerate() {
+                while tile.more[color] < goal && keep_going() {
+                    let count = (goal - tile.more[color]).min(BATCH_SAMPLES);
+                    batch.render(scene, tile, size, Some(color), count, &mut rays);
                 }
             }
             rays

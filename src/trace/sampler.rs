@@ -26,9 +26,24 @@ impl Sampler {
     /// Sample number `index` of `pixel`; `seed` chooses another picture's worth of noise.
     #[must_use]
     pub fn new(pixel: UVec2, index: u32, seed: u32) -> Self {
-        let half = index & 1;
-        let seed = hash(pixel.x ^ hash(pixel.y ^ hash(seed ^ hash(half ^ 0x5bd1_e995))));
-        Self { seed, index: index >> 1, pixel_sampling: Sampling::Sobol, sampling: Sampling::Sobol }
+        Self {
+            seed: pixel_seed(pixel, index & 1, seed),
+            index: index >> 1,
+            pixel_sampling: Sampling::Sobol,
+            sampling: Sampling::Sobol,
+        }
+    }
+
+    /// Those of the even and of the odd samples of a pixel, to be taken from by [`Sampler::at`].
+    #[must_use]
+    pub fn halves(pixel: UVec2, settings: &RenderSettings) -> [Self; 2] {
+        [0, 1].map(|half| Self::new(pixel, half, settings.seed).spread(settings))
+    }
+
+    /// Sample number `index` of the same pixel and half.
+    #[must_use]
+    pub fn at(self, index: u32) -> Self {
+        Self { index: index >> 1, ..self }
     }
 
     /// The same, its numbers spread as `settings` say.
@@ -68,6 +83,10 @@ impl Sampler {
     pub fn hashed(&self, key: u32) -> f32 {
         unit_float(hash(hash(self.seed ^ key) ^ self.index))
     }
+}
+
+fn pixel_seed(pixel: UVec2, half: u32, seed: u32) -> u32 {
+    hash(pixel.x ^ hash(pixel.y ^ hash(seed ^ hash(half ^ 0x5bd1_e995))))
 }
 
 /// The top 24 bits as a number in [0, 1); never 1, whatever `x` is.

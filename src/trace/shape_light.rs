@@ -17,6 +17,11 @@ pub struct ShapeLight {
     pub two_sided: bool,
     /// Seen by rays, and stops them.
     pub visible: bool,
+    /// Of the front; zero if it is round.
+    normal: Vec3,
+    area: f32,
+    /// Sum of the largest coordinates, without sign, that it has.
+    reach: f32,
 }
 
 /// Forms of area lights.
@@ -50,22 +55,28 @@ pub enum Shape {
 }
 
 impl ShapeLight {
+    /// See the fields.
+    #[must_use]
+    pub fn new(shape: Shape, radiance: [Vec3; 4], two_sided: bool, visible: bool) -> Self {
+        let bounds = shape.bounds();
+        let reach = bounds.min.abs().max(bounds.max.abs()).element_sum();
+        let (normal, area) = (shape.normal(), shape.area());
+        Self { shape, radiance, two_sided, visible, normal, area, reach }
+    }
+
     /// A direction toward it from `point`; see [`super::light::FlatLight::sample`].
     pub(super) fn sample(&self, point: Vec3, u: Vec2) -> Option<LightSample> {
         match &self.shape {
             Shape::Parallelogram { corner, u: edge_u, v: edge_v } => {
                 let position = *corner + *edge_u * u.x + *edge_v * u.y;
-                let cross = edge_u.cross(*edge_v);
-                let area = cross.length();
                 let radiance = self.radiance_at(u);
-                sample_flat(point, position, cross / area, area, self.two_sided, radiance)
+                sample_flat(point, position, self.normal, self.area, self.two_sided, radiance)
             }
             Shape::Disk { center, normal, radius } => {
                 let (tangent, bitangent) = normal.any_orthonormal_pair();
                 let (y, x) = (2.0 * PI * u.y).sin_cos();
                 let position = *center + (tangent * x + bitangent * y) * (radius * u.x.sqrt());
-                let area = PI * radius * radius;
-                sample_flat(point, position, *normal, area, self.two_sided, self.radiance[0])
+                sample_flat(point, position, *normal, self.area, self.two_sided, self.radiance[0])
             }
             Shape::Sphere { center, radius } => {
                 let to_center = *center - point;
@@ -98,10 +109,10 @@ impl ShapeLight {
                 let sin2 = radius * radius / center.distance_squared(ray.origin);
                 if sin2 < 1.0 { cone_pdf(sin2) } else { 0.25 / PI }
             }
-            flat => {
+            _ => {
                 let distance2 = (hit.t * ray.direction.length()).powi(2);
-                let cos = flat.normal().dot(ray.direction.normalize()).abs();
-                distance2 / (flat.area() * cos)
+                let cos = self.normal.dot(ray.direction.normalize()).abs();
+                distance2 / (self.area * cos)
             }
         }
     }
@@ -109,6 +120,9 @@ impl ShapeLight {
     /// Where `ray` meets it; solid on both sides, whether it shines there or not.
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
+        if self.surely_missed(ray) {
+            return None;
+        }
         let hit = match &self.shape {
             Shape::Parallelogram { corner, u, v } => {
                 let (u64, v64) = (u.as_dvec3(), v.as_dvec3());
@@ -135,12 +149,27 @@ impl ShapeLight {
         hit.filter(|h| h.t > 0.0 && h.t <= ray.t_max)
     }
 
+    /// Whether the ray ends before the plane of a flat one, or goes away from it, by a margin far above all
+    /// rounding: most do, and need no more exact answer.
+    fn surely_missed(&self, ray: &Ray) -> bool {
+        let corner = match &self.shape {
+            Shape::Parallelogram { corner, .. } => *corner,
+            Shape::Disk { center, .. } => *center,
+            Shape::Sphere { .. } => return false,
+        };
+        let slope = self.normal.dot(ray.direction);
+        let height = self.normal.dot(corner - ray.origin) * slope.signum();
+        let margin = 1e-4 * (self.reach + ray.origin.abs().element_sum());
+        // False for NaN, and for a ray without end.
+        height < -margin || height > slope.abs() * (1.0001 * ray.t_max) + margin
+    }
+
     /// Emitted radiance back along a ray that hit here, and the density of sampling its direction.
     #[must_use]
     pub fn emitted(&self, ray: &Ray, hit: &ShapeHit) -> (Vec3, f32) {
         let shines = match &self.shape {
             Shape::Sphere { .. } => true,
-            flat => self.two_sided || flat.normal().dot(ray.direction) < 0.0,
+            _ => self.two_sided || self.normal.dot(ray.direction) < 0.0,
         };
         let radiance = if shines { self.radiance_at(hit.uv) } else { Vec3::ZERO };
         (radiance, self.pdf(ray, hit))

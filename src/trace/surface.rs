@@ -42,18 +42,23 @@ impl Interaction {
         // In double precision the point lies in the plane whatever the rounding of u and v.
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let local = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
-        let world_from_local = placement.world_from_local();
-        let position = world_from_local.transform_point3(local);
-
+        let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(DVec3::Z);
+        // Most things are where their mesh is.
+        let (position, spread, facet) = if placement.is_identity() {
+            (local, local.abs(), facet)
+        } else {
+            let world_from_local = placement.world_from_local();
+            let m = world_from_local.matrix3;
+            let spread = m.x_axis.abs() * local.x.abs()
+                + m.y_axis.abs() * local.y.abs()
+                + m.z_axis.abs() * local.z.abs();
+            // The inverse transpose keeps sides, also under a mirroring placement.
+            let facet = (instance.normal_matrix * facet).normalize_or(DVec3::Z);
+            (world_from_local.transform_point3(local), spread, facet)
+        };
+        let facet = facet.as_vec3();
         // The next ray starts from the rounded point, and rounds again on its way into local space.
-        let m = world_from_local.matrix3;
-        let spread =
-            m.x_axis.abs() * local.x.abs() + m.y_axis.abs() * local.y.abs() + m.z_axis.abs() * local.z.abs();
         let error = (position.abs() + spread) * (2.0 * UNIT);
-
-        // The inverse transpose keeps sides, also under a mirroring placement.
-        let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let facet = (instance.normal_matrix * facet.normalize_or(DVec3::Z)).normalize_or(DVec3::Z).as_vec3();
         let front = facet.dot(ray.direction) < 0.0;
         let geometric_normal = if front { facet } else { -facet };
 

@@ -1,0 +1,146 @@
+//! More samples where there is more noise: no less right, and better.
+#![allow(clippy::print_stdout, reason = "a test shows its figures")]
+
+#[path = "support/stage.rs"]
+mod stage;
+
+use glam::{DAffine3, DVec3, UVec2, Vec3};
+use penumbra::app::FrameBudget;
+use penumbra::scene::{Light, Material};
+use penumbra::trace::allot::{EVEN, shares};
+use penumbra::trace::{Film, Integrator, RenderSettings, trace_pass};
+use stage::{Stage, quad, settings};
+
+const HERE: DAffine3 = DAffine3::IDENTITY;
+
+/// The shadow of an edge on a floor, from above: dark, a narrow penumbra, light.
+fn edge(size: u32) -> Stage {
+    let mut stage = Stage::new(settings(size, size, Integrator::Direct, 1));
+    let white = Material { base_color: Vec3::ONE, ..Material::default() };
+    stage.add_mesh(quad(Vec3::new(-9.0, 0.0, -9.0), Vec3::Z * 18.0, Vec3::X * 18.0), white.clone(), HERE);
+    stage.add_mesh(quad(Vec3::new(-9.0, 1.0, -9.0), Vec3::Z * 18.0, Vec3::X * 9.0), white, HERE);
+    let lamp = Light::Parallelogram {
+        edge_u: Vec3::X * 0.5,
+        edge_v: Vec3::Z * 0.5,
+        radiance: [Vec3::splat(9.0); 4],
+        two_sided: true,
+    };
+    stage.add(lamp, DAffine3::from_translation(DVec3::Y * 3.0));
+    // Between the floor and the edge.
+    stage.look(DVec3::new(0.0, 0.9, 0.0), DVec3::ZERO, DVec3::Z, 4.0);
+    stage.trace(1);
+    stage
+}
+
+/// A film of its own from the stage's scene.
+fn film(stage: &Stage, seed: u32, samples: u32, adaptive: bool) -> Film {
+    let settings = RenderSettings { seed, ..*stage.scene().settings };
+    let scene = penumbra::trace::TraceScene { settings: &settings, ..stage.scene() };
+    let mut film = Film::new(settings.size, 0);
+    trace_pass(&scene, &mut film, EVEN, EVEN, || true);
+    if adaptive {
+        let shares = shares(&film).unwrap();
+        film.allot(&shares);
+    }
+    trace_pass(&scene, &mut film, samples, samples, || true);
+    assert_eq!(film.complete_samples(), samples);
+    film
+}
+
+fn reds(film: &Film) -> Vec<f64> {
+    stage::reds(film)
+}
+
+/// Mean and variance of the mean over several pictures, by pixel.
+#[derive(Default)]
+struct Moments(Vec<[f64; 2]>, f64);
+
+impl Moments {
+    fn add(&mut self, values: &[f64]) {
+        self.0.resize(values.len(), [0.0; 2]);
+        for (sums, v) in self.0.iter_mut().zip(values) {
+            sums[0] += v;
+            sums[1] += v * v;
+        }
+        self.1 += 1.0;
+    }
+    /// Of the mean over all pixels, whose noise is independent: difference in standard errors.
+    fn sigmas_from(&self, other: &Self) -> f64 {
+        let (mut difference, mut variance) = (0.0, 0.0);
+        for (a, b) in self.0.iter().zip(&other.0) {
+            difference += a[0] / self.1 - b[0] / other.1;
+            for (sums, n) in [(a, self.1), (b, other.1)] {
+                variance += (sums[1] / n - (sums[0] / n).powi(2)).max(0.0) / (n - 1.0);
+            }
+        }
+        difference / variance.sqrt()
+    }
+    fn mean_square_from(&self, truth: &[f64]) -> f64 {
+        let n = self.1;
+        let squares = self.0.iter().zip(truth).map(|(s, t)| s[1] / n - 2.0 * t * s[0] / n + t * t);
+        squares.sum::<f64>() / truth.len() as f64
+    }
+}
+
+#[test]
+fn samples_go_to_the_penumbra() {
+    let stage = edge(96);
+    let film = film(&stage, 1, 24, true);
+    let shares = shares(&film).unwrap();
+    let mean: f32 = shares.iter().flatten().sum::<f32>() / (2 * shares.len()) as f32;
+    assert!((mean - 1.0).abs() < 1e-3, "{mean}");
+    let count = |x: u32| film.pixel(x, 48).count();
+    assert!(count(48) > 3 * count(4) && count(48) > 3 * count(91), "{} {} {}", count(4), count(48), count(91));
+    assert!((film.mean_samples() - 24.0).abs() < 1.0, "{}", film.mean_samples());
+}
+
+/// HARDCASES S6. A pixel that ends when its own halves agree is biased, and the same test says so.
+#[test]
+fn how_many_samples_a_pixel_gets_does_not_bias_it() {
+    let stage = edge(48);
+    let [mut adaptive, mut even, mut stopping] = [Moments::default(), Moments::default(), Moments::default()];
+    for seed in 0..1000 {
+        adaptive.add(&reds(&film(&stage, seed, 16, true)));
+        let all = film(&stage, seed + 5000, 16, false);
+        even.add(&reds(&all));
+        let few = film(&stage, seed + 5000, EVEN, false);
+        let size = few.size();
+        let pixels = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
+        let stopped: Vec<f64> = pixels
+            .map(|p| {
+                let early = few.pixel(p.x, p.y);
+                let [a, b] = [0, 1].map(|half| early.half_mean(half).unwrap().x);
+                // Dark by chance is dark for ever.
+                if a.max(b) == 0.0 { 0.0 } else { all.pixel(p.x, p.y).mean().x }
+            })
+            .collect();
+        stopping.add(&stopped);
+    }
+    let (fair, unfair) = (adaptive.sigmas_from(&even), stopping.sigmas_from(&even));
+    println!("adaptive {fair:+.1} sigma, stopping early {unfair:+.1} sigma");
+    // Two-sided, 1e-5.
+    assert!(fair.abs() < 4.5, "biased by {fair:.1} sigma");
+    assert!(unfair < -4.5, "the test is blind: {unfair:.1} sigma");
+}
+
+#[test]
+fn the_error_is_smaller_for_the_same_samples() {
+    let stage = edge(96);
+    let truth = reds(&film(&stage, 99, 8192, false));
+    let [mut adaptive, mut even] = [Moments::default(), Moments::default()];
+    for seed in 0..20 {
+        adaptive.add(&reds(&film(&stage, seed, 64, true)));
+        even.add(&reds(&film(&stage, seed, 64, false)));
+    }
+    let gain = (even.mean_square_from(&truth) / adaptive.mean_square_from(&truth)).sqrt();
+    println!("error of even samples over adaptive ones: {gain:.2}");
+    assert!(gain > 1.3, "{gain}");
+}
+
+#[test]
+fn a_frame_budget_asks_for_it() {
+    let mut stage = edge(32);
+    stage.app.world.resource_mut::<FrameBudget>().adaptive = true;
+    let film = stage.trace(40);
+    assert!(film.is_allotted());
+}
