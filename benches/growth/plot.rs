@@ -24,6 +24,8 @@ struct Panel {
     lines: &'static [(&'static str, Value)],
     /// From and to, as powers of ten.
     range: (f64, f64),
+    /// Where the curves leave room for the legend: above those that rise, below those that fall.
+    legend_above: bool,
 }
 
 const PANELS: [Panel; 3] = [
@@ -31,16 +33,19 @@ const PANELS: [Panel; 3] = [
         title: "seconds to build",
         lines: &[("1 thread", |p| p.build_seconds[0]), ("2 threads", |p| p.build_seconds[1])],
         range: (-4.5, 1.5),
+        legend_above: true,
     },
     Panel {
         title: "bytes per triangle",
         lines: &[("finished", |p| p.bytes), ("most while building", |p| p.peak_bytes)],
         range: (1.4, 3.0),
+        legend_above: true,
     },
     Panel {
         title: "million rays a second, 1 thread",
         lines: &[("primary", |p| p.rays[0]), ("shadow", |p| p.rays[1]), ("bounce", |p| p.rays[2])],
-        range: (-1.3, 2.4),
+        range: (-1.6, 2.4),
+        legend_above: false,
     },
 ];
 
@@ -115,9 +120,8 @@ where
     }
     let plot = chart.plotting_area().strip_coord_spec();
     for (i, (name, color, dashed)) in (0..).zip(keys) {
-        // Where the curves are not: rising ones leave the upper left free, falling ones the lower left.
         let height = plot.dim_in_pixel().1 as i32;
-        let y = if panel.range.0 < 0.0 && panel.range.0 > -1.0 { height - 110 } else { 12 } + 17 * i;
+        let y = if panel.legend_above { 12 } else { height - 100 } + 17 * i;
         let pieces: &[(i32, i32)] = if dashed { &[(10, 16), (20, 26), (30, 36)] } else { &[(10, 36)] };
         for &(from, to) in pieces {
             plot.draw(&PathElement::new([(from, y), (to, y)], color.stroke_width(2)))?;
