@@ -118,6 +118,9 @@ pub struct SceneArgs {
     /// Samples per pixel
     #[arg(long, visible_alias = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
+    /// The same number of samples for every pixel, also without --spp [default: more where there is more noise]
+    #[arg(long)]
+    pub even: bool,
     /// Another seed, other noise
     #[arg(long, value_name = "N")]
     pub seed: Option<u32>,

@@ -69,7 +69,7 @@ fn window(args: &WindowArgs) -> u8 {
         }
     };
     set_threads(args.scene.threads);
-    let wishes = args.scene.wishes(&args.output);
+    let (wishes, even) = (args.scene.wishes(&args.output), args.scene.even);
     let options = ViewOptions {
         title: format!("Penumbra – {}", source.name()),
         size: wishes.size.unwrap_or(RenderSettings::default().size),
@@ -82,6 +82,7 @@ fn window(args: &WindowArgs) -> u8 {
             tell(&opened.report);
             let mut budget = opened.app.world.resource_mut::<FrameBudget>();
             budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
+            budget.adaptive = opened.samples.is_none() && !even;
             Ok(opened.app)
         }
         Err(error) => Err(error.to_string()),
@@ -162,6 +163,7 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
         wishes: scene.wishes(output),
         time_limit: output.time_limit,
         noise: output.noise,
+        even: scene.even,
         resume: output.resume.clone(),
         error_log: output.reference.clone().zip(output.error_log.clone()),
         outputs,

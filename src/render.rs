@@ -29,6 +29,8 @@ pub struct RenderJob {
     pub time_limit: Option<Duration>,
     /// Stop when the picture's relative noise is down to this.
     pub noise: Option<f64>,
+    /// The same number of samples for every pixel, also where the end is open.
+    pub even: bool,
     /// A film to go on with.
     pub resume: Option<PathBuf>,
     /// Reference and table: the true error as it falls.
@@ -186,7 +188,7 @@ pub fn render(
     let target = target.min(u32::MAX - first_sample);
 
     app.world.insert_resource(FrameBudget {
-        adaptive: open_end && asked.is_none() && !films,
+        adaptive: open_end && asked.is_none() && !films && !job.even,
         interrupt: Arc::clone(&job.interrupt),
         ..FrameBudget::default()
     });

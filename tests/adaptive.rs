@@ -90,7 +90,13 @@ fn samples_go_to_the_penumbra() {
     let mean: f32 = shares.iter().flatten().sum::<f32>() / (2 * shares.len()) as f32;
     assert!((mean - 1.0).abs() < 1e-3, "{mean}");
     let count = |x: u32| film.pixel(x, 48).count();
-    assert!(count(48) > 3 * count(4) && count(48) > 3 * count(91), "{} {} {}", count(4), count(48), count(91));
+    assert!(
+        count(48) > 3 * count(4) && count(48) > 3 * count(91),
+        "{} {} {}",
+        count(4),
+        count(48),
+        count(91)
+    );
     assert!((film.mean_samples() - 24.0).abs() < 1.0, "{}", film.mean_samples());
 }
 

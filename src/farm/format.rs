@@ -9,7 +9,7 @@
 //! | 12 | 4 | length of the header |
 //! | 16 | 8 | length of the file |
 //! | 24 | | the header: [`Header`] as JSON |
-//! | | | the tiles, in rows from the top, 16 x 16 pixels each except at the right and lower border |
+//! | | | the tiles, in rows from the top, 8 x 8 pixels each except at the right and lower border |
 //! | end − 16 | 16 | [`Fingerprint`] of everything before |
 //!
 //! A tile: how many ranges of sample indices it holds, and first index and length of each; how many samples
@@ -284,4 +284,4 @@ fn read_tile(reader: &mut Reader, tile: &mut Tile) -> Result<Ranges, &'static st
 }
 
 /// The format is made of tiles of this size.
-const _: () = assert!(TILE == 16, "film files of another tile size are another format");
+const _: () = assert!(TILE == 8, "film files of another tile size are another format");

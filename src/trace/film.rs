@@ -9,7 +9,7 @@ use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2, Vec3};
 
 /// Side of a tile in pixels.
-pub const TILE: u32 = 16;
+pub const TILE: u32 = 8;
 
 /// A sum of f32 samples as a multiple of 2⁻⁶⁰.
 ///
