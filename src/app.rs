@@ -7,8 +7,8 @@ use crate::scene::propagate_transforms;
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise::relative_noise;
 use crate::trace::{
-    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, allot,
-    trace_pass,
+    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint,
+    trace_adaptive, trace_pass,
 };
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
@@ -148,16 +148,8 @@ impl App {
     /// A small picture of what the camera sees, apart from the film. Call [`App::build`] first.
     #[must_use]
     pub fn probe(&self, size: UVec2, samples: u32) -> Film {
-        let scene = TraceScene {
-            geometry: self.world.resource::<Geometry>(),
-            surfaces: self.world.resource::<Surfaces>(),
-            coverage: self.world.resource::<Coverage>(),
-            lights: self.world.resource::<Lights>(),
-            viewpoint: self.world.resource::<Viewpoint>(),
-            settings: self.world.resource::<RenderSettings>(),
-        };
         let mut film = Film::new(size, 0);
-        trace_pass(&scene, &mut film, samples, samples, || true);
+        trace_pass(&sync::traceable(&self.world), &mut film, samples, samples, || true);
         film
     }
 
@@ -258,15 +250,13 @@ pub fn trace_frame(
     let in_time = || budget.time.is_none_or(|time| start.elapsed() < time);
     let keep_going = || in_time() && !budget.interrupt.load(Ordering::Relaxed);
     while film.complete_samples() < target && keep_going() {
-        let even = budget.adaptive && !film.is_allotted();
-        let until = if even { allot::EVEN.min(target) } else { target };
-        rays = rays + trace_pass(&scene, &mut film, until, budget.pass_samples, keep_going);
-        if even
-            && film.complete_samples() == allot::EVEN
-            && let Some(shares) = allot::shares(&film)
-        {
-            film.allot(&shares);
-        }
+        let step = budget.pass_samples;
+        rays = rays
+            + if budget.adaptive {
+                trace_adaptive(&scene, &mut film, target, step, keep_going)
+            } else {
+                trace_pass(&scene, &mut film, target, step, keep_going)
+            };
         if budget.time.is_none() {
             break;
         }

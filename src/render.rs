@@ -3,11 +3,10 @@
 use crate::app::{FrameBudget, FrameStats};
 use crate::farm::{self, FilmError, FilmFile, Header, Identity, is_film};
 use crate::image::compare::{CompareError, LinearImage};
-use crate::image::files::linear_pixels;
 use crate::image::{Display, ErrorLog, ImageError, save};
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
-use crate::trace::{Film, Geometry, Integrator, RayCounts, RenderSettings};
+use crate::trace::{Film, Geometry, RayCounts, RenderSettings};
 use crate::watch::{Seen, Watch};
 use glam::UVec2;
 use serde::Serialize;
@@ -268,10 +267,7 @@ pub fn render(
         version: env!("CARGO_PKG_VERSION"),
         width: settings.size.x,
         height: settings.size.y,
-        integrator: match settings.integrator {
-            Integrator::Direct => "direct",
-            Integrator::Path => "path",
-        },
+        integrator: settings.integrator.name(),
         max_depth: settings.max_depth,
         seed: settings.seed,
         threads: rayon::current_num_threads(),
@@ -333,7 +329,7 @@ fn folder_exists(path: &Path) -> Result<(), ImageError> {
 fn reference_picture(path: &Path, size: UVec2) -> Result<LinearImage, RenderError> {
     let reference = if is_film(path) {
         let film = FilmFile::read(path)?.film;
-        LinearImage { size: film.size(), pixels: linear_pixels(&film) }
+        LinearImage::of(&film)
     } else {
         LinearImage::open(path)?
     };

@@ -8,8 +8,8 @@ use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::FrameBudget;
 use penumbra::scene::{Light, Material};
 use penumbra::trace::allot::{EVEN, shares};
-use penumbra::trace::{Film, Integrator, RenderSettings, trace_pass};
-use stage::{Stage, quad, settings};
+use penumbra::trace::{Film, Integrator, RenderSettings, TraceScene, trace_adaptive, trace_pass};
+use stage::{Stage, quad, reds, settings};
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 
@@ -35,20 +35,17 @@ fn edge(size: u32) -> Stage {
 /// A film of its own from the stage's scene.
 fn film(stage: &Stage, seed: u32, samples: u32, adaptive: bool) -> Film {
     let settings = RenderSettings { seed, ..*stage.scene().settings };
-    let scene = penumbra::trace::TraceScene { settings: &settings, ..stage.scene() };
+    let scene = TraceScene { settings: &settings, ..stage.scene() };
     let mut film = Film::new(settings.size, 0);
-    trace_pass(&scene, &mut film, EVEN, EVEN, || true);
-    if adaptive {
-        let shares = shares(&film).unwrap();
-        film.allot(&shares);
+    while film.complete_samples() < samples {
+        if adaptive {
+            trace_adaptive(&scene, &mut film, samples, samples, || true);
+        } else {
+            trace_pass(&scene, &mut film, samples, samples, || true);
+        }
     }
-    trace_pass(&scene, &mut film, samples, samples, || true);
     assert_eq!(film.complete_samples(), samples);
     film
-}
-
-fn reds(film: &Film) -> Vec<f64> {
-    stage::reds(film)
 }
 
 /// Mean and variance of the mean over several pictures, by pixel.
@@ -86,7 +83,7 @@ impl Moments {
 fn samples_go_to_the_penumbra() {
     let stage = edge(96);
     let film = film(&stage, 1, 24, true);
-    let shares = shares(&film).unwrap();
+    let shares = shares(&film);
     let mean: f32 = shares.iter().flatten().sum::<f32>() / (2 * shares.len()) as f32;
     assert!((mean - 1.0).abs() < 1e-3, "{mean}");
     let count = |x: u32| film.pixel(x, 48).count();
@@ -141,6 +138,24 @@ fn the_error_is_smaller_for_the_same_samples() {
     let gain = (even.mean_square_from(&truth) / adaptive.mean_square_from(&truth)).sqrt();
     println!("error of even samples over adaptive ones: {gain:.2}");
     assert!(gain > 1.3, "{gain}");
+}
+
+/// A pixel all of whose samples were dropped must not hold up the others.
+#[test]
+fn a_pixel_without_samples_says_nothing() {
+    let mut film = Film::new(UVec2::splat(20), 0);
+    for tile in film.tiles_mut() {
+        for pixel in tile.pixels_mut() {
+            pixel.add(0, Vec3::ONE);
+            pixel.add(1, Vec3::ONE);
+        }
+        tile.next_sample = EVEN;
+    }
+    let empty = Film::new(UVec2::splat(20), 0);
+    film.tiles_mut()[1].pixels_mut()[5] = *empty.pixel(0, 0);
+    film.tiles_mut()[2].pixels_mut()[5].add(1, Vec3::splat(9.0));
+    let shares = shares(&film);
+    assert!(shares.iter().flatten().all(|share| share.is_finite() && *share > 0.0), "{shares:?}");
 }
 
 #[test]

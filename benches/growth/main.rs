@@ -1,10 +1,8 @@
-//! How time and memory grow with the number of triangles: a table, and `assets/pictures/growth.svg` and
-//! `.png`. `cargo bench --bench growth -- 7` goes to 10⁷ triangles, which takes 2 GB.
+//! How time and memory grow with the number of triangles: a table, and `assets/pictures/growth.svg`.
+//! `cargo bench --bench growth -- 7` goes to 10⁷ triangles, which takes 2 GB.
 //!
 //! Before anything counts, hits are compared with those of trying every triangle.
 
-mod canvas;
-mod log_axis;
 mod plot;
 #[path = "../shapes/mod.rs"]
 mod shapes;

@@ -1,8 +1,7 @@
 //! Three panels, log-log: time to build, memory, speed.
 
-use super::canvas::Canvas;
-use super::log_axis::LogAxis;
 use super::{Growth, Point};
+use penumbra::report::log_axis::{LogAxis, tick};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -49,18 +48,15 @@ const PANELS: [Panel; 3] = [
     },
 ];
 
-/// Writes `assets/pictures/growth.svg` and `.png`.
+/// Writes `assets/pictures/growth.svg`.
 ///
 /// # Errors
 /// If they can't be drawn or written.
 pub fn write(all: &[Growth]) -> Result<(), Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/pictures");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/pictures/growth.svg");
     let mut svg = String::new();
     draw(&SVGBackend::with_string(&mut svg, SIZE).into_drawing_area(), all)?;
-    std::fs::write(folder.join("growth.svg"), svg)?;
-    let mut rgb = vec![0; 3 * (SIZE.0 * SIZE.1) as usize];
-    draw(&Canvas::new(&mut rgb, SIZE).into_drawing_area(), all)?;
-    image::save_buffer(folder.join("growth.png"), &rgb, SIZE.0, SIZE.1, image::ColorType::Rgb8)?;
+    std::fs::write(path, svg)?;
     Ok(())
 }
 
@@ -86,7 +82,8 @@ where
 {
     let most = all.iter().flat_map(|growth| &growth.points).map(|point| point.triangles).max().unwrap_or(1);
     let text = |size: f64| (FONT, size).into_font().color(&INK);
-    let (across, up) = (LogAxis(2.9, (most as f64).log10() + 0.1), LogAxis(panel.range.0, panel.range.1));
+    let (across, up) =
+        (LogAxis::new(2.9, (most as f64).log10() + 0.1), LogAxis::new(panel.range.0, panel.range.1));
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .caption(panel.title, text(16.0))
@@ -135,11 +132,4 @@ where
 fn count(place: f64) -> String {
     let number = 10f64.powf(place).round();
     if number < 1e6 { format!("{}k", number / 1e3) } else { format!("{}M", number / 1e6) }
-}
-
-/// The number at a logarithm.
-fn tick(place: f64) -> String {
-    // A hair more: the logarithm of 0.001 may be just below −3.
-    let digits = -(place + 1e-9).floor();
-    format!("{:.*}", digits.max(0.0) as usize, 10f64.powf(place))
 }

@@ -1,7 +1,7 @@
 //! Many rays: sorted into packets, and what is left walks alone.
 
+use super::filter::Filter;
 use super::found::Found;
-use super::leaves::Filter;
 use super::packet::Packet;
 use super::rows::{PACKET, Rays, each, lowest};
 use super::simd::{Job, Simd};
@@ -65,9 +65,7 @@ impl Scratch {
             inner: None,
         })
     }
-}
 
-impl Scratch {
     /// What was learned of the last batch's scene.
     fn forget(&mut self) {
         self.waiting.blocker = None;

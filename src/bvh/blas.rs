@@ -2,7 +2,8 @@
 
 use super::batch::{Batch, Scratch, Target, Triangles};
 use super::build::{build_triangles, has_surface};
-use super::leaves::{All, Filter, Leaves};
+use super::filter::{All, Filter};
+use super::leaves::Leaves;
 use super::simd::{Isa, Simd};
 use super::wide::{WideBvh, WideNode};
 use super::{Aabb, Hit, Probe, Ray};

@@ -1,7 +1,8 @@
 //! Triangles that moved a little: the same hierarchy with new boxes.
 
 use super::leaves::fill_leaf;
-use super::wide::{Child, WIDTH, leaf_cost};
+use super::merge::leaf_cost;
+use super::wide::{Child, WIDTH};
 use super::{Aabb, Blas};
 use glam::Vec3;
 

@@ -1,8 +1,8 @@
 //! Top level: placed instances of bottom levels.
 
 use super::batch::{Batch, Scratch, Target, Triangles};
+use super::filter::{Accept, All, Filter, Only};
 use super::found::Found;
-use super::leaves::{Accept, All, Filter, Only};
 use super::packet::Packet;
 use super::rows::{PACKET, Rays, each, lowest};
 use super::simd::{Isa, Simd};

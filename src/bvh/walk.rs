@@ -4,7 +4,7 @@
 //! fill that time. What a ray needs next is prefetched while the others have their turns.
 
 use super::batch::Target;
-use super::leaves::Filter;
+use super::filter::Filter;
 use super::simd::{Part, Simd, prefetch};
 use super::single::{Boxes, Waiting};
 use super::wide::{Child, WideNode};

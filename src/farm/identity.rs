@@ -2,8 +2,7 @@
 
 use super::Fingerprint;
 use crate::scene::Filter;
-use crate::sync::RenderOrigin;
-use crate::trace::{Coverage, Geometry, Integrator, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use crate::sync::{RenderOrigin, traceable};
 use bevy_ecs::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -39,28 +38,17 @@ impl Identity {
     /// Of the picture that `world` makes. Call [`crate::app::App::build`] first.
     #[must_use]
     pub fn of(world: &World, scene: String) -> Self {
-        let viewpoint = world.resource::<Viewpoint>();
-        let settings = world.resource::<RenderSettings>();
+        let arrays = traceable(world);
+        let settings = arrays.settings;
         let origin = world.resource::<RenderOrigin>().0.unwrap_or_default();
-        let arrays = TraceScene {
-            geometry: world.resource::<Geometry>(),
-            surfaces: world.resource::<Surfaces>(),
-            coverage: world.resource::<Coverage>(),
-            lights: world.resource::<Lights>(),
-            viewpoint,
-            settings,
-        };
         Self {
             program: env!("CARGO_PKG_VERSION").to_owned(),
             scene,
             scene_hash: format!("{:032x}", Fingerprint::of_scene(&arrays, origin)),
-            camera: viewpoint.description(origin),
+            camera: arrays.viewpoint.description(origin),
             width: settings.size.x,
             height: settings.size.y,
-            integrator: match settings.integrator {
-                Integrator::Direct => "direct".to_owned(),
-                Integrator::Path => "path".to_owned(),
-            },
+            integrator: settings.integrator.name().to_owned(),
             max_depth: settings.max_depth,
             filter: match settings.filter {
                 None => "file".to_owned(),
@@ -75,6 +63,15 @@ impl Identity {
             .to_lowercase(),
             seed: settings.seed,
         }
+    }
+
+    /// A number that is another one when anything that is compared is.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        let mut print = Fingerprint::default();
+        // Strings and numbers are always written.
+        print.bytes(&serde_json::to_vec(self).unwrap_or_default());
+        print.finish() as u64
     }
 
     /// What makes this another picture than `wanted`, each point in words; nothing if they are the same.

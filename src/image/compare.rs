@@ -1,7 +1,8 @@
 //! How much two pictures differ.
 
-use super::files::ImageError;
-use crate::scene::color::linear_from_srgb;
+use super::files::{ImageError, linear_pixels};
+use crate::scene::color::{linear_from_srgb, luminance};
+use crate::trace::Film;
 use glam::{UVec2, Vec3};
 use std::path::Path;
 
@@ -52,6 +53,18 @@ pub enum CompareError {
 }
 
 impl LinearImage {
+    /// A film's means.
+    #[must_use]
+    pub fn of(film: &Film) -> Self {
+        Self { size: film.size(), pixels: linear_pixels(film) }
+    }
+
+    /// Of each pixel.
+    #[must_use]
+    pub fn luminances(&self) -> Vec<f64> {
+        self.pixels.iter().map(|&p| f64::from(luminance(p))).collect()
+    }
+
     /// Reads any format that the `image` crate knows.
     ///
     /// # Errors

@@ -1,8 +1,7 @@
 //! The true error against seconds and samples, as a table.
 
 use super::compare::{Difference, LinearImage};
-use super::files::{ImageError, linear_pixels};
-use crate::scene::color::luminance;
+use super::files::ImageError;
 use crate::trace::Film;
 use crate::trace::noise::relative_error;
 use std::fs::File;
@@ -31,7 +30,7 @@ impl ErrorLog {
         let io = |source| ImageError::Io { path: path.to_path_buf(), source };
         let mut file = File::create(path).map_err(io)?;
         writeln!(file, "{COLUMNS}").map_err(io)?;
-        let truth = luminances(&reference);
+        let truth = reference.luminances();
         Ok(Self { path: path.to_path_buf(), file, reference, truth })
     }
 
@@ -40,10 +39,10 @@ impl ErrorLog {
     /// # Errors
     /// If the file cannot be written.
     pub fn note(&mut self, film: &Film, seconds: f64, noise: Option<f64>) -> Result<(), ImageError> {
-        let picture = LinearImage { size: film.size(), pixels: linear_pixels(film) };
+        let picture = LinearImage::of(film);
         let Difference { rmse, relative_mse, .. } = Difference::between(&picture, &self.reference);
         // What the noise number estimates, measured.
-        let relative = relative_error(&luminances(&picture), &self.truth, film.size());
+        let relative = relative_error(&picture.luminances(), &self.truth, film.size());
         let cell = |number: Option<f64>| number.map_or_else(String::new, |number| format!("{number:e}"));
         let (relative, noise) = (cell(relative), cell(noise));
         let samples = film.mean_samples();
@@ -51,8 +50,4 @@ impl ErrorLog {
             .and_then(|()| self.file.flush())
             .map_err(|source| ImageError::Io { path: self.path.clone(), source })
     }
-}
-
-fn luminances(image: &LinearImage) -> Vec<f64> {
-    image.pixels.iter().map(|&p| f64::from(luminance(p))).collect()
 }

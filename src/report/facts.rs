@@ -3,10 +3,9 @@
 use crate::app::App;
 use crate::bvh::wide::{Child, WIDTH};
 use crate::bvh::{Blas, Placement, Tlas, WideBvh};
-use crate::trace::{Geometry, Lights, RenderSettings, Surfaces, Viewpoint};
+use crate::trace::Geometry;
 use glam::Vec3;
 use serde::Serialize;
-use std::fmt::Write;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -100,57 +99,4 @@ fn build_ms(geometry: &Geometry) -> f64 {
         }
     }
     best
-}
-
-/// A number that is another one when anything that the picture depends on is, the noise aside.
-#[must_use]
-pub fn fingerprint(app: &App, settings: &RenderSettings) -> u64 {
-    let geometry = app.world.resource::<Geometry>();
-    let surfaces = app.world.resource::<Surfaces>();
-    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-    for (instance, placement) in geometry.instances.iter().zip(geometry.tlas.placements()) {
-        let mesh = &instance.mesh;
-        hash.bytes(bytemuck::cast_slice(&mesh.positions));
-        hash.bytes(bytemuck::cast_slice(&mesh.normals));
-        hash.bytes(bytemuck::cast_slice(&mesh.uvs));
-        hash.bytes(bytemuck::cast_slice(&mesh.colors));
-        hash.bytes(bytemuck::cast_slice(&mesh.triangles));
-        hash.bytes(bytemuck::cast_slice(&mesh.slots));
-        hash.debug(&(&instance.materials, placement.world_from_local()));
-    }
-    for surface in &surfaces.materials {
-        hash.debug(surface);
-    }
-    for texture in &surfaces.textures {
-        hash.debug(&(texture.encoding, texture.wrap, texture.filter, texture.texels.width));
-        hash.bytes(bytemuck::cast_slice(&texture.texels.texels));
-    }
-    hash.debug(app.world.resource::<Lights>());
-    hash.debug(app.world.resource::<Viewpoint>());
-    hash.debug(&(settings.size, settings.integrator, settings.max_depth, settings.filter));
-    hash.bytes(env!("CARGO_PKG_VERSION").as_bytes());
-    hash.0
-}
-
-/// The FNV-1a hash: the same on every machine.
-struct Fnv(u64);
-
-impl Fnv {
-    fn bytes(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
-        }
-    }
-
-    fn debug(&mut self, value: &impl std::fmt::Debug) {
-        // Writing to a hash cannot fail.
-        let _ = write!(self, "{value:?};");
-    }
-}
-
-impl Write for Fnv {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        self.bytes(text.as_bytes());
-        Ok(())
-    }
 }

@@ -5,11 +5,9 @@ use super::methods::Method;
 use super::statistics::{first_below, value_at};
 use crate::app::App;
 use crate::image::compare::{Difference, LinearImage};
-use crate::image::files::linear_pixels;
+use crate::sync;
 use crate::trace::noise::relative_noise;
-use crate::trace::{
-    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint, trace_pass,
-};
+use crate::trace::{Film, RayCounts, RenderSettings, TraceScene, trace_adaptive, trace_pass};
 use glam::Vec3;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -85,14 +83,7 @@ const MOST_AT_ONCE: u32 = 32;
 /// A built world, as rays need it, with settings of its own.
 #[must_use]
 pub fn traceable<'a>(app: &'a App, settings: &'a RenderSettings) -> TraceScene<'a> {
-    TraceScene {
-        geometry: app.world.resource::<Geometry>(),
-        surfaces: app.world.resource::<Surfaces>(),
-        coverage: app.world.resource::<Coverage>(),
-        lights: app.world.resource::<Lights>(),
-        viewpoint: app.world.resource::<Viewpoint>(),
-        settings,
-    }
+    TraceScene { settings, ..sync::traceable(&app.world) }
 }
 
 /// A film that grows by whole passes, with the time that it took.
@@ -105,6 +96,7 @@ pub struct Tracing<'a> {
     /// Rays traced.
     pub rays: RayCounts,
     interrupt: &'a AtomicBool,
+    adaptive: bool,
     step: u32,
 }
 
@@ -113,7 +105,13 @@ impl<'a> Tracing<'a> {
     #[must_use]
     pub fn new(scene: TraceScene<'a>, interrupt: &'a AtomicBool) -> Self {
         let film = Film::new(scene.settings.size, 0);
-        Self { scene, film, seconds: 0.0, rays: RayCounts::default(), interrupt, step: 1 }
+        Self { scene, film, seconds: 0.0, rays: RayCounts::default(), interrupt, adaptive: false, step: 1 }
+    }
+
+    /// The same with more samples where there is more noise, if so.
+    #[must_use]
+    pub fn adaptive(self, adaptive: bool) -> Self {
+        Self { adaptive, ..self }
     }
 
     /// One pass more, to at most `samples` per pixel. False if it was interrupted: then the film is not
@@ -121,7 +119,12 @@ impl<'a> Tracing<'a> {
     pub fn pass(&mut self, samples: u32) -> bool {
         let going = || !self.interrupt.load(Ordering::Relaxed);
         let start = Instant::now();
-        let rays = trace_pass(&self.scene, &mut self.film, samples, self.step, going);
+        let (scene, film) = (&self.scene, &mut self.film);
+        let rays = if self.adaptive {
+            trace_adaptive(scene, film, samples, self.step, going)
+        } else {
+            trace_pass(scene, film, samples, self.step, going)
+        };
         let taken = start.elapsed();
         self.seconds += taken.as_secs_f64();
         self.rays = self.rays + rays;
@@ -150,7 +153,7 @@ pub fn surfaces(app: &App, settings: &RenderSettings) -> Option<Vec<bool>> {
     let settings = RenderSettings { max_depth: 0, ..*settings };
     let mut film = Film::new(settings.size, 0);
     trace_pass(&traceable(app, &settings), &mut film, MASK_SAMPLES, MASK_SAMPLES, || true);
-    let lit: Vec<bool> = linear_pixels(&film).into_iter().map(|p| p != Vec3::ZERO).collect();
+    let lit: Vec<bool> = LinearImage::of(&film).pixels.into_iter().map(|p| p != Vec3::ZERO).collect();
     // A sliver of a lamp may slip between the samples of its pixel, not of the next.
     let (width, height) = (film.size().x as usize, film.size().y as usize);
     let near_light = |i: usize| {
@@ -178,12 +181,6 @@ pub fn rmse(picture: &LinearImage, reference: &LinearImage, mask: Option<&[bool]
     (Difference::between(picture, reference).rmse, masked)
 }
 
-/// A film's means.
-#[must_use]
-pub fn picture(film: &Film) -> LinearImage {
-    LinearImage { size: film.size(), pixels: linear_pixels(film) }
-}
-
 /// What a run is of.
 pub struct Subject<'a> {
     /// A built world.
@@ -209,7 +206,8 @@ pub fn run(
 ) -> (Run, Option<LinearImage>) {
     let mut settings = RenderSettings { seed, ..subject.settings };
     (method.apply)(&mut settings);
-    let mut tracing = Tracing::new(traceable(subject.app, &settings), subject.interrupt);
+    let mut tracing =
+        Tracing::new(traceable(subject.app, &settings), subject.interrupt).adaptive(method.adaptive);
     let mut run = Run { seed, ..Run::default() };
     let mut kept = None;
     'run: for checkpoint in checkpoints() {
@@ -221,7 +219,7 @@ pub fn run(
         }
         let samples = tracing.samples();
         if run.points.last().is_none_or(|last| last.samples < samples) {
-            let picture = picture(&tracing.film);
+            let picture = LinearImage::of(&tracing.film);
             let (rmse, rmse_surfaces) = rmse(&picture, subject.reference, subject.surfaces);
             run.points.push(Point {
                 samples,
@@ -233,7 +231,7 @@ pub fn run(
             run.rays = tracing.rays;
         }
         if samples == PICTURE_SAMPLES {
-            kept = Some(picture(&tracing.film));
+            kept = Some(LinearImage::of(&tracing.film));
         }
         if tracing.seconds >= limit {
             break;

@@ -14,6 +14,8 @@ pub struct Method {
     pub changes: &'static str,
     /// Ours with one thing switched off, not a peer.
     pub ablation: bool,
+    /// More samples where there is more noise.
+    pub adaptive: bool,
     /// What it changes in the settings.
     pub apply: fn(&mut RenderSettings),
 }
@@ -24,12 +26,13 @@ pub const OURS: &str = "ours";
 pub const RANDOM: &str = "random";
 
 /// All of them, in the order of the tables.
-pub const METHODS: [Method; 6] = [
+pub const METHODS: [Method; 7] = [
     Method {
         name: RANDOM,
         title: "plain random",
         changes: "every number independent, as the ancestor sampled its area lights",
         ablation: false,
+        adaptive: false,
         apply: |settings| settings.sampling = Sampling::Independent,
     },
     Method {
@@ -37,13 +40,24 @@ pub const METHODS: [Method; 6] = [
         title: "stratified 4×4",
         changes: "a jittered grid of 4 × 4 cells, over and over",
         ablation: false,
+        adaptive: false,
         apply: |settings| settings.sampling = Sampling::Stratified,
     },
     Method {
         name: OURS,
         title: "ours",
-        changes: "(0, 2)-sequences with Owen scrambling for the pixel, the lights and the bounces",
+        changes: "(0, 2)-sequences with Owen scrambling for the pixel, the lights and the bounces; more samples where \
+                  there is more noise",
         ablation: false,
+        adaptive: true,
+        apply: |_| {},
+    },
+    Method {
+        name: "even",
+        title: "ours − adaptive",
+        changes: "the same number of samples for every pixel",
+        ablation: true,
+        adaptive: false,
         apply: |_| {},
     },
     Method {
@@ -51,6 +65,7 @@ pub const METHODS: [Method; 6] = [
         title: "ours − scrambling",
         changes: "the same sequences with a random shift in place of Owen's scrambling",
         ablation: true,
+        adaptive: true,
         apply: |settings| settings.sampling = Sampling::Shifted,
     },
     Method {
@@ -58,6 +73,7 @@ pub const METHODS: [Method; 6] = [
         title: "ours − pixel",
         changes: "independent places in the pixel, the rest as ours",
         ablation: true,
+        adaptive: true,
         apply: |settings| settings.pixel_sampling = Some(Sampling::Independent),
     },
     Method {
@@ -65,6 +81,7 @@ pub const METHODS: [Method; 6] = [
         title: "ours − lights",
         changes: "independent samples of lights and bounces, the places in the pixel as ours",
         ablation: true,
+        adaptive: true,
         apply: |settings| {
             settings.sampling = Sampling::Independent;
             settings.pixel_sampling = Some(Sampling::Sobol);
@@ -79,13 +96,13 @@ mod tests {
     #[test]
     fn every_method_but_ours_changes_something_of_its_own() {
         let ours = RenderSettings::default();
-        let changed: Vec<RenderSettings> = METHODS
+        let changed: Vec<(RenderSettings, bool)> = METHODS
             .iter()
             .map(|method| {
                 let mut settings = ours;
                 (method.apply)(&mut settings);
-                assert_eq!(settings == ours, method.name == OURS, "{}", method.name);
-                settings
+                assert_eq!(settings == ours && method.adaptive, method.name == OURS, "{}", method.name);
+                (settings, method.adaptive)
             })
             .collect();
         for (i, a) in changed.iter().enumerate() {

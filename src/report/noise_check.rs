@@ -5,7 +5,7 @@ use super::statistics::{mean_and_deviation, percentile};
 use crate::app::App;
 use crate::image::compare::LinearImage;
 use crate::scene::color::luminance;
-use crate::trace::noise::relative_noise;
+use crate::trace::noise::{relative_error, relative_noise};
 use crate::trace::{Film, RenderSettings};
 use glam::DVec3;
 use serde::Serialize;
@@ -42,27 +42,6 @@ const FIRST_SEED: u32 = 1000;
 /// Samples per pixel of a run, at least and at most.
 const SAMPLES: (f64, f64) = (2.0, 64.0);
 
-/// Relative error of the picture's luminance in the measure of [`relative_noise`], but with the reference's
-/// brightness in the denominator: the picture's would be a part of what is judged.
-#[must_use]
-pub fn relative_error(shown: &[f64], truth: &[f64]) -> Option<f64> {
-    let mut lit: Vec<f64> = truth.iter().copied().filter(|&i| i > 0.0).collect();
-    if lit.is_empty() {
-        return None;
-    }
-    let middle = lit.len() / 2;
-    let median = *lit.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let floor = (0.1 * median).powi(2);
-    let square = |(i, t): (&f64, &f64)| (i - t).powi(2) / (t * t + floor);
-    let sum: f64 = shown.iter().zip(truth).map(square).sum();
-    Some((sum / truth.len() as f64).sqrt())
-}
-
-fn brightness(film: &Film) -> Vec<f64> {
-    let pixels = (0..film.size().y).flat_map(|y| film.row(y));
-    pixels.map(|pixel| f64::from(luminance(pixel.mean().as_vec3()))).collect()
-}
-
 /// Makes the runs, so that they take `seconds` in all; fewer if interrupted, `None` if hardly any.
 pub fn check(
     app: &App,
@@ -75,7 +54,7 @@ pub fn check(
     let affordable = seconds * samples_per_second / f64::from(RUNS);
     // A power of two, as the sequences are made for; NaN becomes the least.
     let samples = affordable.clamp(SAMPLES.0, SAMPLES.1).log2().floor().exp2().max(SAMPLES.0) as u32;
-    let truth: Vec<f64> = reference.pixels.iter().map(|&p| f64::from(luminance(p))).collect();
+    let truth = reference.luminances();
     let (mut found, mut spent) = (Found::default(), 0.0);
     for run in 0..RUNS {
         let settings = RenderSettings { seed: FIRST_SEED + run, ..*settings };
@@ -87,7 +66,8 @@ pub fn check(
         }
         spent += tracing.seconds;
         progress(spent);
-        let error = relative_error(&brightness(&tracing.film), &truth).filter(|&error| error > 0.0);
+        let error = relative_error(&LinearImage::of(&tracing.film).luminances(), &truth, settings.size)
+            .filter(|&error| error > 0.0);
         if let (Some(noise), Some(error)) = (relative_noise(&tracing.film), error) {
             found.ratios.push(noise / error);
             found.errors.push(error);
@@ -144,13 +124,6 @@ impl NoiseCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_true_error_of_a_picture_that_is_off_everywhere() {
-        let error = relative_error(&[1.5; 16], &[1.0; 16]).unwrap();
-        assert!((error - 0.5 / 1.01f64.sqrt()).abs() < 1e-12, "{error}");
-        assert_eq!(relative_error(&[1.0; 16], &[0.0; 16]), None, "nothing to be relative to");
-    }
 
     #[test]
     fn squares_are_those_of_the_halves_and_of_the_error() {

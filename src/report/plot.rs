@@ -24,10 +24,11 @@ const PAPER_HEX: &str = "#FEFEFE";
 const PAPER: RGBColor = RGBColor(0xfe, 0xfe, 0xfe);
 /// Told apart by those who see few colours, on white and on black: after Okabe and Ito, "Color Universal
 /// Design", 2008. Ours gets the strongest.
-const COLORS: [(&str, RGBColor); 6] = [
+const COLORS: [(&str, RGBColor); 7] = [
     (RANDOM, RGBColor(0xd5, 0x5e, 0x00)),
     ("stratified", RGBColor(0xcc, 0x79, 0xa7)),
     (OURS, RGBColor(0x1f, 0x83, 0xc4)),
+    ("even", RGBColor(0x56, 0xb4, 0xe9)),
     ("shifted", RGBColor(0x00, 0x9e, 0x73)),
     ("random-pixel", RGBColor(0xe6, 0x9f, 0x00)),
     ("random-light", RGBColor(0x8a, 0x8d, 0x93)),

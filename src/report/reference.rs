@@ -1,9 +1,10 @@
 //! What errors are measured against: a long run of our own, kept on disk, or a picture that is given.
 
+use super::ReportError;
 use super::curve::Measure;
-use super::measure::{Tracing, picture, traceable};
-use super::{ReportError, facts};
+use super::measure::{Tracing, traceable};
 use crate::app::App;
+use crate::farm::Identity;
 use crate::image::compare::LinearImage;
 use crate::image::files::write_whole;
 use crate::image::{Display, save};
@@ -127,7 +128,7 @@ pub fn made(
     interrupt: &AtomicBool,
     mut progress: impl FnMut(f64),
 ) -> Result<Option<Reference>, ReportError> {
-    let path = folder.join(format!("{name}-{:016x}.exr", facts::fingerprint(app, settings)));
+    let path = folder.join(format!("{name}-{:016x}.exr", Identity::of(&app.world, String::new()).hash()));
     let beside = path.with_extension("json");
     let facts = |origin, making| ReferenceFacts {
         origin,
@@ -155,7 +156,7 @@ pub fn made(
     };
     save(&path, &tracing.film, &Display::default())?;
     write_whole(&beside, &serde_json::to_vec_pretty(&making)?)?;
-    Ok(Some(Reference { picture: picture(&tracing.film), facts: facts(Origin::Made, making) }))
+    Ok(Some(Reference { picture: LinearImage::of(&tracing.film), facts: facts(Origin::Made, making) }))
 }
 
 /// What is not there, or not whole, is made anew.

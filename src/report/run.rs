@@ -14,7 +14,7 @@ use crate::image::compare::LinearImage;
 use crate::image::files::write_whole;
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{Opened, open};
-use crate::trace::{Integrator, RenderSettings};
+use crate::trace::RenderSettings;
 use glam::UVec2;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -147,10 +147,7 @@ fn measure_scene(
         name: name.to_owned(),
         width: settings.size.x,
         height: settings.size.y,
-        integrator: match settings.integrator {
-            Integrator::Direct => "direct",
-            Integrator::Path => "path",
-        },
+        integrator: settings.integrator.name(),
         max_depth: settings.max_depth,
         facts,
         performance,

@@ -22,9 +22,22 @@ pub use surfaces::{MaterialNumbers, sync_coverage, sync_surfaces};
 
 use crate::bvh::Isa;
 use crate::scene::{ActiveCamera, Camera, GlobalTransform};
-use crate::trace::{Film, Geometry, Lights, RenderSettings, Surfaces, Viewpoint};
+use crate::trace::{Coverage, Film, Geometry, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3};
+
+/// All that the picture depends on, as rays see it.
+#[must_use]
+pub fn traceable(world: &World) -> TraceScene<'_> {
+    TraceScene {
+        geometry: world.resource::<Geometry>(),
+        surfaces: world.resource::<Surfaces>(),
+        coverage: world.resource::<Coverage>(),
+        lights: world.resource::<Lights>(),
+        viewpoint: world.resource::<Viewpoint>(),
+        settings: world.resource::<RenderSettings>(),
+    }
+}
 
 /// Where render space has its origin in the world, chosen once per scene.
 ///

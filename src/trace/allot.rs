@@ -21,21 +21,23 @@ const BRIGHT: f64 = 10.0;
 /// Shares for [`Film::allot`]: where n samples leave an error of σ/n^a, with a = 0.75 for scrambled nets on
 /// penumbrae, the mean squared error is least with n in proportion to σ^(1/(a + ½)).
 ///
-/// `None` if some pixel lacks one of the two halves, half of whose difference stands for the error.
+/// Half the difference of the two halves stands for the error. A pixel that lacks one (all its samples may have
+/// been dropped) says nothing.
 #[must_use]
-pub fn shares(film: &Film) -> Option<Vec<[f32; 2]>> {
-    let (first, second) = (by_color(film, 1)?, by_color(film, 0)?);
-    Some(first.into_iter().zip(second).map(|(a, b)| [a, b]).collect())
+pub fn shares(film: &Film) -> Vec<[f32; 2]> {
+    by_color(film, 1).into_iter().zip(by_color(film, 0)).map(|(a, b)| [a, b]).collect()
 }
 
 /// A share for each tile, from its pixels of one colour.
-fn by_color(film: &Film, color: usize) -> Option<Vec<f32>> {
+fn by_color(film: &Film, color: usize) -> Vec<f32> {
     let (mut variances, mut brightness) = (Vec::new(), Vec::new());
     for tile in film.tiles() {
         let (mut sum, mut light, mut count) = (0.0, 0.0, 0.0);
         for (i, pixel) in (0..).zip(tile.pixels()) {
-            if tile.color(i) == color {
-                sum += (pixel.half_mean(0)? - pixel.half_mean(1)?).length_squared();
+            if tile.color(i) == color
+                && let Some((a, b)) = pixel.half_mean(0).zip(pixel.half_mean(1))
+            {
+                sum += (a - b).length_squared();
                 light += f64::from(luminance(pixel.mean().as_vec3()));
                 count += 1.0;
             }
@@ -64,11 +66,11 @@ fn by_color(film: &Film, color: usize) -> Option<Vec<f32>> {
     let wanted: Vec<f64> = (0..variances.len()).map(wanted).collect();
     let mean = mean(film, &wanted);
     if !(mean > 0.0 && mean.is_finite()) {
-        return Some(vec![1.0; wanted.len()]);
+        return vec![1.0; wanted.len()];
     }
     let clamped: Vec<f64> = wanted.iter().map(|w| (w / mean).clamp(LEAST, MOST)).collect();
     let mean = self::mean(film, &clamped);
-    Some(clamped.iter().map(|w| (w / mean) as f32).collect())
+    clamped.iter().map(|w| (w / mean) as f32).collect()
 }
 
 /// Over all pixels, of what each tile has.

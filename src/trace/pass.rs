@@ -1,7 +1,7 @@
 //! Tiles over threads.
 
 use super::integrator::Batch;
-use super::{Film, TraceScene};
+use super::{Film, TraceScene, allot};
 use rayon::prelude::*;
 
 /// Rays by kind.
@@ -37,6 +37,25 @@ impl std::ops::Add for RayCounts {
 /// Samples per pixel that are followed together: more would only need more memory (at 32 and 16 × 16
 /// pixels a thread's buffers take about 2 MB).
 const BATCH_SAMPLES: u32 = 32;
+
+/// As [`trace_pass`], but after some even samples more go where there is more noise.
+pub fn trace_adaptive(
+    scene: &TraceScene,
+    film: &mut Film,
+    until: u32,
+    step: u32,
+    keep_going: impl Fn() -> bool + Sync,
+) -> RayCounts {
+    if film.is_allotted() {
+        return trace_pass(scene, film, until, step, keep_going);
+    }
+    let rays = trace_pass(scene, film, until.min(allot::EVEN), step, keep_going);
+    if film.complete_samples() == allot::EVEN {
+        let shares = allot::shares(film);
+        film.allot(&shares);
+    }
+    rays
+}
 
 /// Brings all tiles to their share of `until` samples per pixel, `step` samples at a time, as long as `keep_going`.
 ///

@@ -49,6 +49,17 @@ pub enum Integrator {
     Path,
 }
 
+impl Integrator {
+    /// What the command line calls it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Path => "path",
+        }
+    }
+}
+
 impl Default for RenderSettings {
     fn default() -> Self {
         Self {

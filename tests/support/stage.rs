@@ -93,15 +93,7 @@ impl Stage {
 
     /// All that the picture depends on, as rays see it (after the first frame).
     pub fn scene(&self) -> TraceScene<'_> {
-        let world = &self.app.world;
-        TraceScene {
-            geometry: world.resource::<Geometry>(),
-            surfaces: world.resource::<Surfaces>(),
-            coverage: world.resource::<Coverage>(),
-            lights: world.resource::<Lights>(),
-            viewpoint: world.resource::<Viewpoint>(),
-            settings: world.resource::<RenderSettings>(),
-        }
+        penumbra::sync::traceable(&self.app.world)
     }
 }
 

@@ -4,37 +4,11 @@
 //! two passes over the list: one sorts it into bins, the other parts it in two and finds the extents of
 //! both halves on the way.
 
+use super::bins::{Bins, Grid, best_plane};
+use super::prim::{Extent, Prim, half_area};
 use super::{Bvh, Node, SAH_LEVELS};
-use crate::bvh::Aabb;
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::{Vec3, Vec4Swizzles};
 use rayon::prelude::*;
-
-/// A box to be sorted: the lower corner and the index in one vector, the upper corner in the other.
-#[derive(Clone, Copy, Debug, bytemuck::Zeroable)]
-#[repr(C)]
-pub(in crate::bvh) struct Prim {
-    lo: Vec4,
-    hi: Vec4,
-}
-
-/// Makes an index below 2²⁸ an ordinary float, so that vectors it is part of are not slowed down by a
-/// denormal one.
-const INDEX_MARK: u32 = 0x4000_0000;
-
-/// A box and the box of the centres of what is in it. The fourth components mean nothing.
-#[derive(Clone, Copy)]
-struct Extent {
-    lo: Vec4,
-    hi: Vec4,
-    center_lo: Vec4,
-    center_hi: Vec4,
-}
-
-#[derive(Clone, Copy)]
-struct Bin {
-    lo: Vec4,
-    hi: Vec4,
-}
 
 /// Cost of visiting a node over that of testing a triangle.
 const NODE_COST: f32 = 1.0;
@@ -42,71 +16,6 @@ const NODE_COST: f32 = 1.0;
 const PIECE: usize = 1 << 14;
 /// Subtrees over fewer are one task.
 const TASK: usize = 1 << 13;
-
-impl Prim {
-    pub fn new(aabb: Aabb, index: u32) -> Self {
-        debug_assert!(index < INDEX_MARK >> 2);
-        Self { lo: aabb.min.extend(f32::from_bits(INDEX_MARK | index)), hi: aabb.max.extend(0.0) }
-    }
-
-    /// What takes the place of something without a surface.
-    pub const NOTHING: Self = Self { lo: Vec4::NAN, hi: Vec4::NAN };
-
-    /// Whether there is something.
-    pub fn is_some(&self) -> bool {
-        self.hi.w == 0.0
-    }
-
-    pub fn aabb(&self) -> Aabb {
-        Aabb { min: self.lo.xyz(), max: self.hi.xyz() }
-    }
-
-    pub fn index(&self) -> u32 {
-        self.lo.w.to_bits() & !INDEX_MARK
-    }
-
-    fn center(&self) -> Vec4 {
-        self.lo * 0.5 + self.hi * 0.5
-    }
-}
-
-impl Extent {
-    const EMPTY: Self = Self {
-        lo: Vec4::INFINITY,
-        hi: Vec4::NEG_INFINITY,
-        center_lo: Vec4::INFINITY,
-        center_hi: Vec4::NEG_INFINITY,
-    };
-
-    fn add(&mut self, prim: &Prim) {
-        let center = prim.center();
-        self.lo = self.lo.min(prim.lo);
-        self.hi = self.hi.max(prim.hi);
-        self.center_lo = self.center_lo.min(center);
-        self.center_hi = self.center_hi.max(center);
-    }
-
-    fn union(self, other: Self) -> Self {
-        Self {
-            lo: self.lo.min(other.lo),
-            hi: self.hi.max(other.hi),
-            center_lo: self.center_lo.min(other.center_lo),
-            center_hi: self.center_hi.max(other.center_hi),
-        }
-    }
-
-    fn of(prims: &[Prim]) -> Self {
-        prims.iter().fold(Self::EMPTY, |mut extent, prim| {
-            extent.add(prim);
-            extent
-        })
-    }
-}
-
-fn half_area(lo: Vec4, hi: Vec4) -> f32 {
-    let d: Vec3 = (hi - lo).xyz().max(Vec3::ZERO);
-    d.x * d.y + d.y * d.z + d.z * d.x
-}
 
 /// What a subtree became.
 pub(in crate::bvh) enum Subtree<T> {
@@ -349,108 +258,4 @@ fn part_pieces(
         })
         .reduce(|| [Extent::EMPTY; 2], |a, b| [a[0].union(b[0]), a[1].union(b[1])]);
     (middle, extents)
-}
-
-/// Where the bins are.
-#[derive(Clone, Copy)]
-struct Grid {
-    origin: Vec4,
-    /// Bins per length; 0 along axes without extent.
-    scale: Vec4,
-}
-
-impl Grid {
-    fn new(extent: &Extent, bins: usize) -> Self {
-        let size = extent.center_hi - extent.center_lo;
-        let scale = size.map(|size| if size > 0.0 { bins as f32 / size } else { 0.0 });
-        let finite = scale.map(|scale| if scale.is_finite() { scale } else { 0.0 });
-        Self { origin: extent.center_lo, scale: finite }
-    }
-
-    /// For each axis the bin of a prim's centre.
-    #[inline]
-    fn bin<const N: usize>(&self, prim: &Prim) -> [usize; 3] {
-        // Rounds down by adding so much that only whole numbers remain, which is cheaper than a cast that
-        // saturates. Monotonic, which is all that matters.
-        let place = (prim.center() - self.origin) * self.scale - 0.5;
-        let place = place.min(Vec4::splat((N - 1) as f32)).max(Vec4::ZERO) + (1 << 23) as f32;
-        [place.x, place.y, place.z].map(|place| place.to_bits() as usize % N)
-    }
-}
-
-#[derive(Clone)]
-struct Bins<const N: usize> {
-    grid: Grid,
-    bins: [[Bin; N]; 3],
-    counts: [[u32; N]; 3],
-}
-
-impl<const N: usize> Bins<N> {
-    fn empty(grid: Grid) -> Self {
-        let none = Bin { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
-        Self { grid, bins: [[none; N]; 3], counts: [[0; N]; 3] }
-    }
-
-    fn with(prims: &[Prim], grid: Grid) -> Self {
-        let mut bins = Self::empty(grid);
-        for prim in prims {
-            for (axis, place) in grid.bin::<N>(prim).into_iter().enumerate() {
-                let bin = &mut bins.bins[axis][place % N];
-                bin.lo = bin.lo.min(prim.lo);
-                bin.hi = bin.hi.max(prim.hi);
-                bins.counts[axis][place % N] += 1;
-            }
-        }
-        bins
-    }
-
-    fn union(mut self, other: Self) -> Self {
-        for axis in 0..3 {
-            for i in 0..N {
-                let bin = &mut self.bins[axis][i];
-                bin.lo = bin.lo.min(other.bins[axis][i].lo);
-                bin.hi = bin.hi.max(other.bins[axis][i].hi);
-                self.counts[axis][i] += other.counts[axis][i];
-            }
-        }
-        self
-    }
-}
-
-/// Bins of `axis` below `bin` are left of it.
-struct Plane {
-    axis: usize,
-    bin: usize,
-}
-
-/// The cheapest plane with something on both sides, and its cost: areas times numbers.
-fn best_plane<const N: usize>(bins: &Bins<N>) -> Option<(f32, Plane)> {
-    let mut best: Option<(f32, Plane)> = None;
-    for axis in 0..3 {
-        if bins.grid.scale[axis] == 0.0 {
-            continue;
-        }
-        let (boxes, counts) = (&bins.bins[axis], &bins.counts[axis]);
-        // Cost of everything right of each plane, then sweep from the left.
-        let mut right = [0.0; N];
-        let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
-        for i in (1..N).rev() {
-            lo = lo.min(boxes[i].lo);
-            hi = hi.max(boxes[i].hi);
-            count += counts[i];
-            right[i] = half_area(lo, hi) * count as f32;
-        }
-        let all = count + counts[0];
-        let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
-        for i in 1..N {
-            lo = lo.min(boxes[i - 1].lo);
-            hi = hi.max(boxes[i - 1].hi);
-            count += counts[i - 1];
-            let cost = half_area(lo, hi) * count as f32 + right[i];
-            if count > 0 && count < all && best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, Plane { axis, bin: i }));
-            }
-        }
-    }
-    best
 }

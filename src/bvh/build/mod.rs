@@ -1,17 +1,19 @@
 //! Boxes or triangles → binary hierarchy, the same for any number of threads.
 
 mod binned;
+mod bins;
 mod check;
+mod prim;
 mod split;
 
 pub(super) use binned::Subtree;
 pub use check::Defect;
 
-use super::{Aabb, WideBvh, leaves, wide};
-use binned::Prim;
+use super::{Aabb, WideBvh, leaves, merge, wide};
 use glam::{DVec3, Vec3};
+use merge::Part;
+use prim::Prim;
 use rayon::prelude::*;
-use wide::Part;
 
 /// 32 bytes, two to a cache line. Two children are neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +84,7 @@ pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     // needed is that of the boxes.
     let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF));
     let leaves = tree.parts().into_par_iter().map(Part::leaf_list).collect();
-    let wide = wide::join(tree, order);
+    let wide = merge::join(tree, order);
     let rows = leaves::rows(leaves, &wide.prims, triangles);
     (wide, rows)
 }

@@ -6,7 +6,7 @@
 //! here parts are shared out by the square root of the area to be saved, which is what minimises the sum
 //! for needles (n parts of one have an n-th of its area).
 
-use super::binned::Prim;
+use super::prim::Prim;
 use crate::bvh::Aabb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

@@ -1,5 +1,7 @@
 //! The command line: arguments in, wishes out.
 
+mod values;
+
 use crate::bvh::Isa;
 use crate::image::ToneMap;
 use crate::load::{LoadError, LoadOptions, SceneSource};
@@ -14,6 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
+use values::{exposure, isa, noise, resolution, sample_range, seconds, vector, view_angle};
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
@@ -387,72 +390,6 @@ impl ReportArgs {
     }
 }
 
-fn isa(text: &str) -> Result<Isa, String> {
-    Isa::named(text).ok_or_else(|| {
-        let names: Vec<&str> = Isa::available().into_iter().map(Isa::name).collect();
-        format!("this machine has {}", names.join(", "))
-    })
-}
-
-fn resolution(text: &str) -> Result<UVec2, String> {
-    let wrong = || format!("\"{text}\" is not a size such as 1280x720");
-    let (width, height) = text.split_once(['x', ',']).ok_or_else(wrong)?;
-    let side = |s: &str| s.trim().parse().ok().filter(|n| (1..=65536).contains(n)).ok_or_else(wrong);
-    let size = UVec2::new(side(width)?, side(height)?);
-    // 112 bytes a pixel: more than this is a slip of the finger.
-    if u64::from(size.x) * u64::from(size.y) > 1 << 28 {
-        return Err(format!("\"{text}\" has more than 2^28 pixels"));
-    }
-    Ok(size)
-}
-
-fn vector(text: &str) -> Result<DVec3, String> {
-    let wrong = || format!("\"{text}\" is not a vector such as 1,2.5,-3");
-    let numbers: Vec<f64> =
-        text.split(',').map(|s| s.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
-    let [x, y, z] = *numbers.as_slice() else { return Err(wrong()) };
-    let vector = DVec3::new(x, y, z);
-    if vector.is_finite() { Ok(vector) } else { Err(wrong()) }
-}
-
-fn view_angle(text: &str) -> Result<f32, String> {
-    let degrees = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    if 0.0 < degrees && degrees < 180.0 {
-        Ok(degrees)
-    } else {
-        Err("must lie between 0 and 180 degrees".to_owned())
-    }
-}
-
-fn exposure(text: &str) -> Result<f32, String> {
-    let stops: f32 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    if stops.abs() <= 100.0 { Ok(stops) } else { Err("must lie within -100 to 100 stops".to_owned()) }
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    let number: f64 =
-        text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    Duration::try_from_secs_f64(number).map_err(|e| e.to_string())
-}
-
-fn noise(text: &str) -> Result<f64, String> {
-    let (digits, unit) = text.strip_suffix('%').map_or((text, 1.0), |digits| (digits, 0.01));
-    let number: f64 = digits.trim().parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    let noise = number * unit;
-    if 0.0 < noise && noise <= 1.0 {
-        Ok(noise)
-    } else {
-        Err("must lie above 0 and be at most 1, which is 100%; write 1% or 0.01".to_owned())
-    }
-}
-
-fn sample_range(text: &str) -> Result<Range<u32>, String> {
-    let wrong = || format!("\"{text}\" is not a range such as 16..64");
-    let (start, end) = text.split_once("..").ok_or_else(wrong)?;
-    let range = start.trim().parse().map_err(|_| wrong())?..end.trim().parse().map_err(|_| wrong())?;
-    if range.is_empty() { Err(format!("\"{text}\" holds no sample")) } else { Ok(range) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -461,23 +398,5 @@ mod tests {
     #[test]
     fn the_definition_is_sound() {
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn values_are_read_as_people_write_them() {
-        assert_eq!(resolution("1280x720"), Ok(UVec2::new(1280, 720)));
-        assert_eq!(resolution("7,3"), Ok(UVec2::new(7, 3)));
-        assert_eq!(vector("-1, 2.5,3e1"), Ok(DVec3::new(-1.0, 2.5, 30.0)));
-        assert_eq!(sample_range("16..64"), Ok(16..64));
-        assert_eq!(seconds("1.5s"), Ok(Duration::from_millis(1500)));
-        for wrong in ["0x5", "5", "ax3", "65536x65536"] {
-            assert!(resolution(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!((noise("1%"), noise("0.02"), noise("100 %")), (Ok(0.01), Ok(0.02), Ok(1.0)));
-        for wrong in ["0", "-1%", "5", "nan", "inf", "%", "x"] {
-            assert!(noise(wrong).is_err(), "{wrong}");
-        }
-        assert!(vector("1,2").is_err() && vector("1,2,nan").is_err());
-        assert!(sample_range("64..16").is_err() && view_angle("180").is_err() && exposure("nan").is_err());
     }
 }
