@@ -98,12 +98,13 @@ fn a_quick_report_has_all_files_and_its_figures_make_sense() {
     let (ours, even) = (slope_of("ours", "all"), slope_of("even", "all"));
     assert!(ours < -0.9 && even < -0.65, "{ours} {even}");
     // Each thing switched off costs something, at equal samples.
-    let at_16 = |name: &str| {
-        let points = method(name)["all"]["curve"].as_array().unwrap();
+    let at_16 = |name: &str, of: &str| {
+        let points = method(name)[of]["curve"].as_array().unwrap();
         points.iter().find(|p| p["samples"] == 16).unwrap()["rmse"].as_f64().unwrap()
     };
-    for worse in ["random", "stratified", "random-pixel", "even"] {
-        assert!(at_16("ours") < at_16(worse), "{worse}");
+    assert!(at_16("ours", "all") < at_16("even", "all"));
+    for worse in ["random", "stratified", "random-light", "random-pixel"] {
+        assert!(at_16("even", "surfaces") < at_16(worse, "surfaces"), "{worse}");
     }
     let check = &scene["noise_check"];
     assert_eq!(check["runs"], 100);
