@@ -84,12 +84,6 @@ impl Leaves {
         size_of_val(&*self.rows) + size_of_val(&*self.ids)
     }
 
-    /// Nine floats for each.
-    #[inline(always)]
-    pub fn triangles(&self) -> &[[f32; 9]] {
-        self.rows.as_chunks().0
-    }
-
     /// A triangle of a leaf.
     #[inline(always)]
     fn corners(rows: &[f32], count: usize, i: usize) -> [Vec3; 3] {

@@ -1,11 +1,11 @@
 //! Rays that go different ways: several at once, one step each in turn.
 //!
 //! A step of one ray waits for memory and for a long chain of dependent operations; the steps of other rays
-//! fill that time. What a ray needs next is prefetched while the others have their turns.
+//! fill that time.
 
 use super::batch::Target;
 use super::filter::Filter;
-use super::simd::{Part, Simd, prefetch};
+use super::simd::{Part, Simd};
 use super::single::{Boxes, Waiting};
 use super::wide::{Child, WideNode};
 use super::{Blas, Hit, Probe, Ray};
@@ -181,11 +181,6 @@ impl<'a, S: Simd> Walker<'a, S> {
                 self.enter_root(simd, &blas.wide.nodes);
                 return true;
             }
-        }
-        if self.count > 0 {
-            let next = self.waiting.get(self.count - 1).1;
-            let triangles = inside.map_or(&[][..], |(blas, _)| blas.leaves.triangles());
-            prefetch(nodes, triangles, Child::unpack(next));
         }
         true
     }

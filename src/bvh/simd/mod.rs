@@ -13,11 +13,6 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-#[cfg(not(target_arch = "x86_64"))]
-pub use portable::prefetch;
-#[cfg(target_arch = "x86_64")]
-pub use x86::prefetch;
-
 pub use isa::{Isa, Job};
 pub use portable::{Narrow, One, Plain};
 

@@ -45,11 +45,6 @@ pub struct Four(Vec4);
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<T>(pub(super) T, pub(super) T);
 
-/// There is nothing to ask for on this machine.
-#[cfg(not(target_arch = "x86_64"))]
-#[inline(always)]
-pub fn prefetch<N, T>(_: &[N], _: &[T], _: crate::bvh::wide::Child) {}
-
 impl One {
     /// The float.
     #[inline(always)]

@@ -2,7 +2,6 @@
 
 use super::portable::{Pair, pair_lanes};
 use super::{Lanes, Mask, Octet, Part, Simd, portable::PairMask};
-use crate::bvh::wide::Child;
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -35,20 +34,6 @@ impl Avx512 {
             && is_x86_feature_detected!("avx512dq")
             && is_x86_feature_detected!("avx512bw");
         has.then_some(Self(()))
-    }
-}
-
-/// Asks for four cache lines of what a child is, from its node or its first triangle on, to be brought near.
-#[inline(always)]
-pub fn prefetch<N, T>(nodes: &[N], triangles: &[T], child: Child) {
-    // Chosen without a branch: which it is cannot be foretold.
-    let start: *const i8 = match child {
-        Child::Node(index) => nodes.as_ptr().wrapping_add(index).cast(),
-        Child::Leaf { first, .. } => triangles.as_ptr().wrapping_add(first).cast(),
-    };
-    for line in 0..4 {
-        // SAFETY: SSE is part of x86-64, and prefetching touches no memory, wherever it points.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
     }
 }
 
