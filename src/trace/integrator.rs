@@ -5,6 +5,7 @@
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
 use super::bsdf::{Bsdf, Lobes};
+use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::{FlatLight, LightSample};
 use super::pass::RayCounts;
@@ -17,62 +18,65 @@ use glam::{UVec2, Vec3};
 
 /// One path under way.
 #[derive(Clone, Copy, Debug)]
-struct Path {
+pub(super) struct Path {
     /// Which entry of the batch it adds to.
-    entry: u32,
-    sampler: Sampler,
-    ray: Ray,
+    pub(super) entry: u32,
+    pub(super) sampler: Sampler,
+    pub(super) ray: Ray,
     /// What light at the ray's end is worth at the eye.
-    throughput: Vec3,
-    depth: u32,
+    pub(super) throughput: Vec3,
+    pub(super) depth: u32,
     /// How the last bounce chose the ray's direction; `None`: no light sample could have found it.
-    bounce: Option<Bounce>,
+    pub(super) bounce: Option<Bounce>,
     /// Only collects what shines at its end.
-    last: bool,
+    pub(super) last: bool,
 }
 
 /// The smooth bounce that a ray comes from.
 #[derive(Clone, Copy, Debug)]
-struct Bounce {
-    pdf: f32,
-    normal: Vec3,
+pub(super) struct Bounce {
+    pub(super) pdf: f32,
+    pub(super) normal: Vec3,
+    /// Lights that have been counted in full where it comes from, a bit for each.
+    pub(super) counted: u32,
 }
 
 /// A ray toward a light, and what it brings if nothing is in the way.
 #[derive(Clone, Copy, Debug)]
-struct Shadow {
-    entry: u32,
-    sampler: Sampler,
-    ray: Ray,
-    light: u32,
-    triangle: Option<(u32, u32)>,
-    contribution: Vec3,
-    key: u32,
+pub(super) struct Shadow {
+    pub(super) entry: u32,
+    pub(super) sampler: Sampler,
+    pub(super) ray: Ray,
+    pub(super) light: u32,
+    pub(super) triangle: Option<(u32, u32)>,
+    pub(super) contribution: Vec3,
+    pub(super) key: u32,
 }
 
 /// Buffers of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Batch {
     pixels: Vec<(u32, UVec2, [Sampler; 2])>,
-    paths: Vec<Path>,
-    next: Vec<Path>,
-    shadows: Vec<Shadow>,
+    pub(super) paths: Vec<Path>,
+    pub(super) next: Vec<Path>,
+    pub(super) shadows: Vec<Shadow>,
+    pub(super) diffuse: Diffuse,
     rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
+    pub(super) hits: Vec<Option<Hit>>,
     ignored: Vec<Option<(u32, u32)>>,
     blocked: Vec<bool>,
-    radiance: Vec<Vec3>,
+    pub(super) radiance: Vec<Vec3>,
     keys: Vec<(u32, u32)>,
 }
 
 /// Dimensions of the sampler: pair 0 is the place in the pixel, then this many pairs a bounce.
-const PAIRS_PER_BOUNCE: u32 = 32;
-const LOBE: u32 = 1;
-const DIRECTION: u32 = 2;
-const PICK: u32 = 3;
-const LIGHT: u32 = 4;
+pub(super) const PAIRS_PER_BOUNCE: u32 = 32;
+pub(super) const LOBE: u32 = 1;
+pub(super) const DIRECTION: u32 = 2;
+pub(super) const PICK: u32 = 3;
+pub(super) const LIGHT: u32 = 4;
 /// From this depth on a path may end by chance.
-const ROULETTE_DEPTH: u32 = 4;
+pub(super) const ROULETTE_DEPTH: u32 = 4;
 
 impl Batch {
     /// Adds the next `count` samples to each pixel of `tile`, or to those of one colour, for a picture of `size`.
@@ -85,6 +89,7 @@ impl Batch {
         count: u32,
         rays: &mut RayCounts,
     ) {
+        self.diffuse.enter(scene, tile, size);
         let first = tile.next_sample + color.map_or(0, |color| tile.more[color]);
         self.paths.clear();
         self.keys.clear();
@@ -141,9 +146,9 @@ impl Batch {
         let random = |i: usize, key: u32| paths[i].sampler.hashed(key ^ paths[i].depth);
         scene.closest_hits(&self.rays, &mut self.hits, random);
         for i in 0..self.paths.len() {
-            let path = self.paths[i];
-            self.arrive(scene, &path, self.hits[i]);
+            self.arrive(scene, i);
         }
+        self.shade_diffuse(scene);
         rays.shadow += self.connect_lights(scene);
         rays.bounce += self.next.len() as u64;
         std::mem::swap(&mut self.paths, &mut self.next);
@@ -171,10 +176,12 @@ impl Batch {
     }
 
     /// What the end of a path's ray sends back along it, and where it goes on.
-    fn arrive(&mut self, scene: &TraceScene, path: &Path, hit: Option<Hit>) {
+    fn arrive(&mut self, scene: &TraceScene, index: usize) {
+        let (path, hit) = (&self.paths[index].clone(), self.hits[index]);
         let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
         if let Some(found) = scene.lights.closest(&before_hit) {
-            let (radiance, pdf) = found.shape.emitted(&path.ray, &found.hit);
+            let radiance = found.shape.emitted(&path.ray, &found.hit);
+            let pdf = path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.normal, &found.hit));
             self.collect(scene, path, found.light, radiance, pdf);
             return;
         }
@@ -188,6 +195,12 @@ impl Batch {
             return;
         };
         let (instance, surface) = scene.surface_at(&hit);
+        if surface.is_diffuse() {
+            if !path.last && path.depth < scene.settings.max_depth {
+                self.diffuse.add(scene, index, &hit, path.depth);
+            }
+            return;
+        }
         let at = Interaction::new(scene, instance, &hit, &path.ray);
         if surface.material.unlit {
             let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
@@ -219,6 +232,9 @@ impl Batch {
     /// Adds light that a ray ran into, weighted against the chance of having sampled it.
     fn collect(&mut self, scene: &TraceScene, path: &Path, light: u32, radiance: Vec3, pdf: f32) {
         let weight = path.bounce.map_or(1.0, |bounce| {
+            if light < u32::BITS && bounce.counted >> light & 1 == 1 {
+                return 0.0;
+            }
             let light_pdf = pdf * scene.lights.chance(path.depth - 1, light);
             power_heuristic(bounce.pdf, light_pdf)
         });
@@ -269,7 +285,7 @@ impl Batch {
             ray: Ray::new(at.origin_toward(sample.wi), sample.wi),
             throughput,
             depth: path.depth + 1,
-            bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal() }),
+            bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal(), counted: 0 }),
             last: smooth && scene.settings.integrator == Integrator::Direct,
         });
     }
@@ -330,7 +346,7 @@ impl Batch {
 }
 
 /// Radiance of an emissive triangle at a sampled point.
-fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
+pub(super) fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
     let hit = Hit { t: 0.0, u: sample.uv.x, v: sample.uv.y, triangle, instance };
     let (data, surface) = scene.surface_at(&hit);
     let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
@@ -342,7 +358,7 @@ fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &Ligh
 /// Weight of a sample of density `a` that might have been taken with density `b`.
 ///
 /// Reference: E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2.2.
-fn power_heuristic(a: f32, b: f32) -> f32 {
+pub(super) fn power_heuristic(a: f32, b: f32) -> f32 {
     // As a ratio: squares of large densities overflow.
     let ratio = b / a;
     1.0 / (1.0 + ratio * ratio)

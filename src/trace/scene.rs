@@ -4,7 +4,7 @@ use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
 use crate::bvh::{Accept, Hit, Ray, Tlas};
-use crate::scene::{Alpha, Material, Texture, TriangleMesh};
+use crate::scene::{Alpha, Glossy, Material, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -64,6 +64,19 @@ pub struct Surface {
     pub glossy_texture: Option<TextureIndex>,
     /// Emission.
     pub emission_texture: Option<TextureIndex>,
+}
+
+impl Surface {
+    /// Whether all it does is to reflect evenly (Lambert), whatever its colour.
+    #[must_use]
+    pub fn is_diffuse(&self) -> bool {
+        let m = &self.material;
+        matches!(m.glossy, Glossy::None)
+            && m.mirror == Vec3::ZERO
+            && m.glass.is_none()
+            && m.emission == Vec3::ZERO
+            && !m.unlit
+    }
 }
 
 /// A texture and how to reach into it.
