@@ -24,7 +24,10 @@ pub type Row = [f32; LANES];
 pub struct Rows(pub [Row; 3]);
 
 impl Rows {
-    fn blank() -> Self {
+    /// Zeros.
+    #[inline(always)]
+    #[must_use]
+    pub fn blank() -> Self {
         Self([[0.0; LANES]; 3])
     }
 

@@ -25,13 +25,24 @@ pub(super) struct Diffuse {
     kinds: [Vec<(u32, u32)>; 3],
     /// Rays through the corners of the tile, around it.
     corners: Option<[Ray; 4]>,
-    /// Triangles of which it is known which lights are clear from their part of the tile.
-    known: Vec<Known>,
+    /// That of the tile, which lends it.
+    clear_lights: ClearLights,
     /// Lights that have been counted in full, a bit for each, of each point of the block.
     counted: Vec<u32>,
     block: Option<Box<Block>>,
     arrivals: Box<Arrivals>,
     departures: Box<Departures>,
+}
+
+/// Of some triangles the lights that are clear from their part of a tile.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ClearLights(Vec<Known>);
+
+/// What is known is no part of the picture.
+impl PartialEq for ClearLights {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// (instance, triangle), and a bit for each light that is clear.
@@ -42,18 +53,37 @@ struct Known {
 }
 
 /// So many triangles are remembered at a time.
-const KNOWN: usize = 64;
+const KNOWN: usize = 16;
 const NOTHING: Known = Known { triangle: (u32::MAX, u32::MAX), clear: 0 };
+
+impl ClearLights {
+    /// What is known of a triangle, or `find`s it out.
+    fn of(&mut self, hit: &Hit, find: impl FnOnce() -> u32) -> u32 {
+        if self.0.is_empty() {
+            self.0.resize(KNOWN, NOTHING);
+        }
+        let triangle = (hit.instance, hit.triangle);
+        let known = &mut self.0[(hit.triangle ^ hit.instance << 3) as usize % KNOWN];
+        if known.triangle != triangle {
+            *known = Known { triangle, clear: find() };
+        }
+        known.clear
+    }
+}
 
 impl Diffuse {
     /// Begins with another batch.
-    pub(super) fn enter(&mut self, scene: &TraceScene, tile: &Tile, size: UVec2) {
+    pub(super) fn enter(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2) {
         let (low, high) = (tile.origin.as_vec2(), (tile.origin + tile.size).as_vec2());
         let ray = |x: f32, y: f32| scene.viewpoint.ray(Vec2::new(x, y), size);
         let around = || [ray(low.x, low.y), ray(high.x, low.y), ray(high.x, high.y), ray(low.x, high.y)];
         self.corners = (scene.settings.shafts && scene.lights.samples_all(0)).then(around);
-        self.known.clear();
-        self.known.resize(KNOWN, NOTHING);
+        self.clear_lights = std::mem::take(&mut tile.clear_lights);
+    }
+
+    /// Ends with it.
+    pub(super) fn leave(&mut self, tile: &mut Tile) {
+        tile.clear_lights = std::mem::take(&mut self.clear_lights);
     }
 
     /// Notes that path number `path` ends in `hit`.
@@ -71,12 +101,7 @@ impl Diffuse {
     /// The lights that nothing keeps from the part of the triangle that the tile shows.
     fn clear(&mut self, scene: &TraceScene, hit: &Hit) -> u32 {
         let Some(corners) = &self.corners else { return 0 };
-        let triangle = (hit.instance, hit.triangle);
-        let known = &mut self.known[(hit.triangle ^ hit.instance << 3) as usize % KNOWN];
-        if known.triangle != triangle {
-            *known = Known { triangle, clear: clear_lights(scene, corners, hit) };
-        }
-        known.clear
+        self.clear_lights.of(hit, || clear_lights(scene, corners, hit))
     }
 }
 
@@ -147,7 +172,7 @@ impl Batch {
         for kind in 0..3 {
             let points = std::mem::take(&mut self.diffuse.kinds[kind]);
             for chunk in points.chunks(LANES) {
-                let like = self.paths[chunk[0].0 as usize].sampler;
+                let like = self.path(chunk[0].0 as usize).sampler;
                 let mut block = self.diffuse.block.take().unwrap_or_else(|| Box::new(Block::new(like)));
                 self.fill(scene, &mut block, chunk, kind < 2);
                 self.diffuse.counted.clear();
@@ -166,7 +191,7 @@ impl Batch {
     fn fill(&self, scene: &TraceScene, block: &mut Block, points: &[(u32, u32)], flat: bool) {
         block.count = points.len();
         for (i, &(number, clear)) in points.iter().enumerate() {
-            let path = &self.paths[number as usize];
+            let path = self.path(number as usize);
             let Some(hit) = &self.hits[number as usize] else { continue };
             block.paths[i] = number;
             block.clear[i] = clear;
@@ -195,11 +220,11 @@ impl Batch {
 
     /// Adds what lights bring for sure, and queues shadow rays for the rest.
     fn light_block(&mut self, scene: &TraceScene, block: &Block) {
-        let depth = self.paths[block.paths[0] as usize].depth;
+        let depth = self.path(block.paths[0] as usize).depth;
         let base = 1 + depth * PAIRS_PER_BOUNCE;
         if !scene.lights.samples_all(depth) {
             for i in 0..block.count {
-                let random = self.paths[block.paths[i] as usize].sampler.pair(base + PICK).x;
+                let random = self.path(block.paths[i] as usize).sampler.pair(base + PICK).x;
                 let pick = scene.lights.pick(depth, 0, random);
                 self.light_point(scene, block, i, pick.light, pick.chance, base + LIGHT);
             }
@@ -229,7 +254,7 @@ impl Batch {
             if contribution == Vec3::ZERO {
                 continue;
             }
-            let path = &self.paths[block.paths[i] as usize];
+            let path = self.path(block.paths[i] as usize);
             if arrivals.certain[i] || block.clear[i] >> light & 1 == 1 {
                 self.radiance[path.entry as usize] += contribution;
                 self.diffuse.counted[i] |= u32::from(arrivals.certain[i]) << light;
@@ -256,7 +281,7 @@ impl Batch {
         chance: f32,
         dimension: u32,
     ) {
-        let path = &self.paths[block.paths[i] as usize];
+        let path = self.path(block.paths[i] as usize);
         let (position, normal, geometric) =
             (block.position.get(i), block.normal.get(i), block.geometric_normal.get(i));
         let random = path.sampler.pair(dimension);
@@ -297,12 +322,12 @@ impl Batch {
 
     /// Sends paths on.
     fn follow_block(&mut self, scene: &TraceScene, block: &Block) {
-        let depth = self.paths[block.paths[0] as usize].depth;
+        let depth = self.path(block.paths[0] as usize).depth;
         let base = 1 + depth * PAIRS_PER_BOUNCE;
-        let out = &mut *self.diffuse.departures;
-        scene.geometry.tlas.isa().run(Depart { block, dimension: base + DIRECTION, out });
+        let mut out = std::mem::take(&mut self.diffuse.departures);
+        scene.geometry.tlas.isa().run(Depart { block, dimension: base + DIRECTION, out: &mut out });
         for i in 0..block.count {
-            let path = &self.paths[block.paths[i] as usize];
+            let path = self.path(block.paths[i] as usize);
             let mut throughput = block.throughput.get(i);
             let pdf = out.pdf[i];
             if pdf <= 0.0 || throughput == Vec3::ZERO {
@@ -326,5 +351,6 @@ impl Batch {
                 last: false,
             });
         }
+        self.diffuse.departures = out;
     }
 }

@@ -5,6 +5,7 @@
 //! (an f32 sum of ones stops at 2²⁴). Even samples go to one half, odd samples to the other;
 //! the halves are scrambled independently, so their difference measures the error of their mean.
 
+use super::diffuse::ClearLights;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2, Vec3};
 
@@ -23,6 +24,18 @@ impl Sum {
     const LIMIT: f32 = (1u64 << 35) as f32;
 
     fn add(&mut self, sample: f32) {
+        if sample.abs() < 4.0 {
+            // A product with a power of two is exact, and what has digits to round is far below 2⁵³.
+            let scaled = f64::from(sample) * (1u64 << Self::FRACTION_BITS) as f64;
+            let magnitude = (scaled.abs() + 0.5) as i64;
+            self.0 += i128::from(if scaled < 0.0 { -magnitude } else { magnitude });
+        } else {
+            self.add_any(sample);
+        }
+    }
+
+    /// For all magnitudes.
+    fn add_any(&mut self, sample: f32) {
         let bits = sample.to_bits();
         let exponent = (bits >> 23 & 0xff) as i32;
         let mantissa = i128::from(bits & 0x7f_ffff) | i128::from(exponent != 0) << 23;
@@ -138,6 +151,8 @@ pub struct Tile {
     pub dropped: u64,
     /// What the pixels hold is from before the last reset.
     stale: bool,
+    /// What is known of its part of the scene until the next reset.
+    pub(super) clear_lights: ClearLights,
     pixels: Vec<Pixel>,
 }
 
@@ -193,6 +208,7 @@ impl Film {
                     shares: [1.0; 2],
                     dropped: 0,
                     stale: false,
+                    clear_lights: ClearLights::default(),
                     pixels,
                 }
             })
@@ -209,6 +225,7 @@ impl Film {
             (tile.more, tile.shares) = ([0; 2], [1.0; 2]);
             tile.dropped = 0;
             tile.stale = true;
+            tile.clear_lights = ClearLights::default();
         }
     }
 
@@ -334,5 +351,30 @@ impl Film {
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.tiles.iter().map(|t| t.dropped).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_samples_are_added_as_all_are() {
+        let (mut quick, mut slow) = (Sum::default(), Sum::default());
+        let mut bits = 1_u32;
+        for _ in 0..1_000_000 {
+            bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let sample = f32::from_bits(bits);
+            if sample.abs() < 4.0 {
+                quick.add(sample);
+                slow.add_any(sample);
+                assert_eq!(quick, slow, "{sample:e}");
+            }
+        }
+        for sample in [1.5 * 2f32.powi(-60), 0.5 * 2f32.powi(-60), -0.5 * 2f32.powi(-60), 4f32.next_down()] {
+            quick.add(sample);
+            slow.add_any(sample);
+            assert_eq!(quick, slow, "{sample:e}");
+        }
     }
 }

@@ -4,17 +4,19 @@
 //! shadows, keep the paths that go on. The result for a sample is a function of its
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
+use super::block::LANES;
 use super::bsdf::{Bsdf, Lobes};
+use super::camera::Look;
 use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::{FlatLight, LightSample};
 use super::pass::RayCounts;
-use super::sampler::Sampler;
+use super::sampler::{Sampler, SamplerRow};
 use super::scene::Surface;
 use super::surface::Interaction;
 use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 /// One path under way.
 #[derive(Clone, Copy, Debug)]
@@ -56,16 +58,18 @@ pub(super) struct Shadow {
 /// Buffers of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Batch {
-    pixels: Vec<(u32, UVec2, [Sampler; 2])>,
+    /// Number in the tile, top left corner, samplers.
+    pixels: Vec<(u32, Vec2, [Sampler; 2])>,
     pub(super) paths: Vec<Path>,
     pub(super) next: Vec<Path>,
     pub(super) shadows: Vec<Shadow>,
     pub(super) diffuse: Diffuse,
-    rays: Vec<Ray>,
+    pub(super) rays: Vec<Ray>,
     pub(super) hits: Vec<Option<Hit>>,
     ignored: Vec<Option<(u32, u32)>>,
     blocked: Vec<bool>,
     pub(super) radiance: Vec<Vec3>,
+    /// Which of `pixels`, and which sample.
     keys: Vec<(u32, u32)>,
 }
 
@@ -91,43 +95,36 @@ impl Batch {
     ) {
         self.diffuse.enter(scene, tile, size);
         let first = tile.next_sample + color.map_or(0, |color| tile.more[color]);
-        self.paths.clear();
-        self.keys.clear();
-        let members =
-            (0..tile.size.element_product()).filter(|&i| color.is_none_or(|color| tile.color(i) == color));
         self.pixels.clear();
-        self.pixels.extend(members.map(|i| {
-            let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
-            (i, pixel, Sampler::halves(pixel, scene.settings))
-        }));
-        for sample in first..first + count {
-            for &(i, pixel, halves) in &self.pixels {
-                let sampler = halves[sample as usize & 1].at(sample);
-                let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), size);
-                let entry = self.keys.len() as u32;
-                self.keys.push((i, sample));
-                let throughput = Vec3::ONE;
-                self.paths.push(Path {
-                    entry,
-                    sampler,
-                    ray,
-                    throughput,
-                    depth: 0,
-                    bounce: None,
-                    last: false,
-                });
+        let mut i = 0;
+        Sampler::tile(tile.origin, tile.size, scene.settings, |halves| {
+            if color.is_none_or(|color| tile.color(i) == color) {
+                let corner = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
+                self.pixels.push((i, corner.as_vec2(), halves));
             }
+            i += 1;
+        });
+        self.keys.clear();
+        self.rays.clear();
+        for sample in first..first + count {
+            self.look(scene, sample, size);
         }
         self.radiance.clear();
         self.radiance.resize(self.keys.len(), Vec3::ZERO);
-        rays.camera += self.paths.len() as u64;
+        rays.camera += self.rays.len() as u64;
+        self.paths.clear();
+        self.wave(scene, rays);
         while !self.paths.is_empty() {
+            self.rays.clear();
+            self.rays.extend(self.paths.iter().map(|path| path.ray));
             self.wave(scene, rays);
         }
+        self.diffuse.leave(tile);
         let mut dropped = 0;
         let pixels = tile.pixels_mut();
         for (&(pixel, sample), &radiance) in self.keys.iter().zip(&self.radiance) {
-            dropped += u64::from(!pixels[pixel as usize].add(sample, radiance));
+            let (index, ..) = self.pixels[pixel as usize];
+            dropped += u64::from(!pixels[index as usize].add(sample, radiance));
         }
         tile.dropped += dropped;
         match color {
@@ -136,16 +133,56 @@ impl Batch {
         }
     }
 
+    /// Queues camera rays: sample number `sample` of each pixel.
+    fn look(&mut self, scene: &TraceScene, sample: u32, size: UVec2) {
+        for (chunk, pixels) in (0..).zip(self.pixels.chunks(LANES)) {
+            let samplers = pixels.iter().map(|(.., halves)| halves[sample as usize & 1].at(sample));
+            let row = SamplerRow::of(samplers);
+            let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+            for (i, (_, corner, _)) in pixels.iter().enumerate() {
+                (x[i], y[i]) = (corner.x, corner.y);
+            }
+            let first = self.rays.len();
+            self.rays.resize(first + pixels.len(), Ray::new(Vec3::ZERO, Vec3::Z));
+            let rays = &mut self.rays[first..];
+            let viewpoint = scene.viewpoint;
+            scene.geometry.tlas.isa().run(Look { viewpoint, size, samplers: &row, corners: [&x, &y], rays });
+            let number = |i: usize| (chunk * LANES + i) as u32;
+            self.keys.extend((0..pixels.len()).map(|i| (number(i), sample)));
+        }
+    }
+
+    /// Path number `index` of this wave. Those of the first one are as they begin.
+    #[inline]
+    pub(super) fn path(&self, index: usize) -> Path {
+        if let Some(path) = self.paths.get(index) {
+            return *path;
+        }
+        let (pixel, sample) = self.keys[index];
+        Path {
+            entry: index as u32,
+            sampler: self.pixels[pixel as usize].2[sample as usize & 1].at(sample),
+            ray: self.rays[index],
+            throughput: Vec3::ONE,
+            depth: 0,
+            bounce: None,
+            last: false,
+        }
+    }
+
+    /// Follows `rays`, which are those of `paths`; in the first wave there are none yet.
     fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
         self.next.clear();
         self.shadows.clear();
-        self.rays.clear();
-        self.rays.extend(self.paths.iter().map(|path| path.ray));
-        self.hits.resize(self.rays.len(), None);
-        let paths = &self.paths;
-        let random = |i: usize, key: u32| paths[i].sampler.hashed(key ^ paths[i].depth);
-        scene.closest_hits(&self.rays, &mut self.hits, random);
-        for i in 0..self.paths.len() {
+        let mut hits = std::mem::take(&mut self.hits);
+        hits.resize(self.rays.len(), None);
+        let random = |i: usize, key: u32| {
+            let path = self.path(i);
+            path.sampler.hashed(key ^ path.depth)
+        };
+        scene.closest_hits(&self.rays, &mut hits, random);
+        self.hits = hits;
+        for i in 0..self.rays.len() {
             self.arrive(scene, i);
         }
         self.shade_diffuse(scene);
@@ -177,7 +214,7 @@ impl Batch {
 
     /// What the end of a path's ray sends back along it, and where it goes on.
     fn arrive(&mut self, scene: &TraceScene, index: usize) {
-        let (path, hit) = (&self.paths[index].clone(), self.hits[index]);
+        let (path, hit) = (&self.path(index), self.hits[index]);
         let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
         if let Some(found) = scene.lights.closest(&before_hit) {
             let radiance = found.shape.emitted(&path.ray, &found.hit);

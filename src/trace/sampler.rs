@@ -40,6 +40,18 @@ impl Sampler {
         [0, 1].map(|half| Self::new(pixel, half, settings.seed).spread(settings))
     }
 
+    /// [`Sampler::halves`] of all pixels of a tile, row by row.
+    pub fn tile(origin: UVec2, size: UVec2, settings: &RenderSettings, mut report: impl FnMut([Self; 2])) {
+        let like = Self::new(origin, 0, settings.seed).spread(settings);
+        let halves = [0, 1].map(|half| hash(settings.seed ^ hash(half ^ 0x5bd1_e995)));
+        for y in origin.y..origin.y + size.y {
+            let [even, odd] = halves.map(|half| hash(y ^ half));
+            for x in origin.x..origin.x + size.x {
+                report([Self { seed: hash(x ^ even), ..like }, Self { seed: hash(x ^ odd), ..like }]);
+            }
+        }
+    }
+
     /// Sample number `index` of the same pixel and half.
     #[must_use]
     pub fn at(self, index: u32) -> Self {
@@ -110,6 +122,19 @@ impl<const N: usize> SamplerRow<N> {
     #[must_use]
     pub fn new(like: Sampler) -> Self {
         Self { seeds: [like.seed; N], indices: [like.index; N], like }
+    }
+
+    /// Those, all spread alike, and what is beyond them as the last.
+    ///
+    /// # Panics
+    /// If there is none.
+    #[must_use]
+    pub fn of(mut samplers: impl Iterator<Item = Sampler>) -> Self {
+        let mut row = Self::new(samplers.next().expect("one at least"));
+        for (i, sampler) in (1..N).zip(samplers) {
+            row.set(i, &sampler);
+        }
+        row
     }
 
     /// Puts one in its place; it must be spread as the others are.
@@ -238,6 +263,19 @@ mod tests {
                 assert!(filled.iter().all(|&f| f), "m {m}, split {split}");
             }
         }
+    }
+
+    #[test]
+    fn a_tile_has_the_samplers_of_its_pixels() {
+        let settings = RenderSettings { seed: 7, sampling: Sampling::Stratified, ..RenderSettings::default() };
+        let (origin, size) = (UVec2::new(16, 8), UVec2::new(5, 3));
+        let mut all = Vec::new();
+        Sampler::tile(origin, size, &settings, |halves| all.push(halves));
+        for (i, halves) in (0..).zip(&all) {
+            let pixel = origin + UVec2::new(i % size.x, i / size.x);
+            assert_eq!(*halves, Sampler::halves(pixel, &settings));
+        }
+        assert_eq!(all.len(), 15);
     }
 
     #[test]

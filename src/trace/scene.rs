@@ -68,6 +68,7 @@ pub struct Surface {
 
 impl Surface {
     /// Whether all it does is to reflect evenly (Lambert), whatever its colour.
+    #[inline]
     #[must_use]
     pub fn is_diffuse(&self) -> bool {
         let m = &self.material;
@@ -113,6 +114,7 @@ pub struct TraceScene<'a> {
 
 impl<'a> TraceScene<'a> {
     /// The instance and the material of a hit.
+    #[inline]
     #[must_use]
     pub fn surface_at(&self, hit: &Hit) -> (&'a InstanceData, &'a Surface) {
         let instance = &self.geometry.instances[hit.instance as usize];

@@ -124,11 +124,13 @@ impl ShapeLight {
     }
 
     /// Where `ray` meets it; solid on both sides, whether it shines there or not.
+    #[inline]
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
-        if self.surely_missed(ray) {
-            return None;
-        }
+        if self.surely_missed(ray) { None } else { self.exact_hit(ray) }
+    }
+
+    fn exact_hit(&self, ray: &Ray) -> Option<ShapeHit> {
         let hit = match &self.shape {
             Shape::Parallelogram(Quad { corner, u, v, .. }) => {
                 let (u64, v64) = (u.as_dvec3(), v.as_dvec3());
@@ -157,6 +159,7 @@ impl ShapeLight {
 
     /// Whether the ray ends before the plane of a flat one, or goes away from it, by a margin far above all
     /// rounding: most do, and need no more exact answer.
+    #[inline]
     fn surely_missed(&self, ray: &Ray) -> bool {
         let corner = match &self.shape {
             Shape::Parallelogram(quad) => quad.corner,
