@@ -1,8 +1,8 @@
 //! Is anything between here and there? Not for one ray but for all from one patch to another.
 //!
-//! A *shaft* is the convex hull of two convex pieces, say a patch of floor and a lamp. A triangle that is outside of
+//! A *shaft* is the convex hull of two flat pieces, say a patch of floor and a lamp. A triangle that is outside of
 //! one of some planes around it, or has both pieces on one side of its own plane, is in the way of no segment between
-//! them. So "clear" is certain, and "not clear" may be a false alarm.
+//! them. So who is not named is certainly not in the way, and who is named may be harmless.
 //!
 //! Reference: E. A. Haines, J. R. Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991.
 
@@ -10,16 +10,19 @@ use super::wide::{Child, WIDTH, WideBvh};
 use super::{Aabb, Blas, Tlas};
 use glam::{DAffine3, DVec3, Vec3};
 
-/// The space between two parallelograms or other pieces of four corners.
+/// The space between two convex pieces.
 #[derive(Clone, Debug)]
 pub struct Shaft {
-    corners: [DVec3; 8],
+    /// Of the first piece, then of the second.
+    corners: Vec<DVec3>,
+    /// How many the first has.
+    first: usize,
     bounds: Aabb,
     /// Outward normals, and what n · p is at most inside.
     planes: Vec<(DVec3, f64)>,
 }
 
-/// So many nodes may be looked at before the answer is "perhaps not".
+/// So many nodes may be looked at before the search is given up.
 const PATIENCE: usize = 256;
 /// Rounding of coordinates and of rays between them, as a part of the largest coordinate.
 const MARGIN: f64 = 1.0 / (1 << 19) as f64;
@@ -27,15 +30,16 @@ const MARGIN: f64 = 1.0 / (1 << 19) as f64;
 const FLATNESS: f64 = 1.0 / (1 << 21) as f64;
 
 impl Shaft {
-    /// Between two pieces, each the convex hull of four corners.
+    /// From one flat piece, the convex hull of its corners, to another.
     #[must_use]
-    pub fn new(from: [DVec3; 4], to: [DVec3; 4]) -> Self {
-        let [a, b, c, d] = from;
-        let [e, f, g, h] = to;
-        let corners = [a, b, c, d, e, f, g, h];
-        let (mut low, mut high) = (a, a);
-        for p in corners {
-            (low, high) = (low.min(p), high.max(p));
+    pub fn new(from: &[DVec3], to: &[DVec3]) -> Self {
+        Self::around([from, to].concat(), from.len())
+    }
+
+    fn around(corners: Vec<DVec3>, first: usize) -> Self {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in &corners {
+            (low, high) = (low.min(*p), high.max(*p));
         }
         let margin = MARGIN * reach(&corners);
         let bounds = Aabb {
@@ -49,12 +53,11 @@ impl Shaft {
                 planes.push((normal, most + margin * normal.abs().element_sum()));
             });
         }
-        Self { corners, bounds, planes }
+        Self { corners, first, bounds, planes }
     }
 
     fn moved(&self, by: &DAffine3) -> Self {
-        let [a, b, c, d, e, f, g, h] = self.corners.map(|p| by.transform_point3(p));
-        Self::new([a, b, c, d], [e, f, g, h])
+        Self::around(self.corners.iter().map(|p| by.transform_point3(*p)).collect(), self.first)
     }
 
     /// Whether the box is surely outside.
@@ -84,45 +87,59 @@ impl Shaft {
         }
         let normal = (b - a).cross(c - a);
         let tolerance = FLATNESS * normal.abs().element_sum() * reach(&self.corners);
-        let heights = self.corners.map(|p| normal.dot(p - a));
-        // Both pieces in the plane itself: no segment crosses it either.
-        heights.iter().all(|&h| h >= -tolerance) || heights.iter().all(|&h| h <= tolerance)
+        let height = |p: &DVec3| normal.dot(*p - a);
+        // The first piece lies in its plane, or all is on one side.
+        self.corners[..self.first].iter().all(|p| height(p).abs() <= tolerance)
+            || self.corners.iter().all(|p| height(p) >= -tolerance)
+            || self.corners.iter().all(|p| height(p) <= tolerance)
     }
 }
 
 impl Tlas {
-    /// Whether surely no triangle is in the way of any segment within `shaft`. Surfaces in which one of its pieces
-    /// lies are not.
+    /// Calls `report` with the instance and the corners, placed, of each triangle that may be in the way of some segment
+    /// within `shaft`; surfaces in which the shaft's first piece lies are not. Stops when `report` says false, or there
+    /// is too much to look at; says whether neither happened.
     #[must_use]
-    pub fn is_clear(&self, shaft: &Shaft) -> bool {
+    pub fn blockers(&self, shaft: &Shaft, mut report: impl FnMut(u32, [Vec3; 3]) -> bool) -> bool {
         let mut patience = PATIENCE;
-        search(self.hierarchy(), shaft, &mut patience, |entry, patience| {
-            let placement = &self.placements()[self.hierarchy().prims[entry.0] as usize];
+        search(self.hierarchy(), shaft, &mut patience, |(entry, _), patience| {
+            let instance = self.hierarchy().prims[entry];
+            let placement = &self.placements()[instance as usize];
             let blas = placement.blas();
             if placement.is_identity() {
-                blas.is_clear(shaft, patience)
-            } else {
-                blas.is_clear(&shaft.moved(placement.local_from_world()), patience)
+                return blas.blockers(shaft, patience, |triangle| report(instance, triangle));
             }
+            let local = shaft.moved(placement.local_from_world());
+            blas.blockers(&local, patience, |triangle| {
+                let placed = |p: Vec3| placement.world_from_local().transform_point3(p.as_dvec3()).as_vec3();
+                report(instance, triangle.map(placed))
+            })
         })
     }
 }
 
 impl Blas {
-    fn is_clear(&self, shaft: &Shaft, patience: &mut usize) -> bool {
+    fn blockers(
+        &self,
+        shaft: &Shaft,
+        patience: &mut usize,
+        mut report: impl FnMut([Vec3; 3]) -> bool,
+    ) -> bool {
         shaft.misses_box(&self.bounds())
             || search(&self.wide, shaft, patience, |(first, count), _| {
-                self.leaves.triangles(first, count).all(|triangle| shaft.misses_triangle(&triangle))
+                self.leaves
+                    .triangles(first, count)
+                    .all(|triangle| shaft.misses_triangle(&triangle) || report(triangle))
             })
     }
 }
 
-/// Whether `clear` says so of all leaves, first entry and number of entries, that are not outside.
+/// Calls `visit` with all leaves, first entry and number of entries, that are not outside, until it says false.
 fn search(
     wide: &WideBvh,
     shaft: &Shaft,
     patience: &mut usize,
-    mut clear: impl FnMut((usize, usize), &mut usize) -> bool,
+    mut visit: impl FnMut((usize, usize), &mut usize) -> bool,
 ) -> bool {
     let mut waiting = Vec::with_capacity(64);
     if !wide.nodes.is_empty() {
@@ -142,7 +159,7 @@ fn search(
             match Child::unpack(node.children[slot]) {
                 Child::Node(child) => waiting.push(child),
                 Child::Leaf { first, count } => {
-                    if !clear((first, count), patience) {
+                    if !visit((first, count), patience) {
                         return false;
                     }
                 }
@@ -153,29 +170,28 @@ fn search(
 }
 
 /// The largest coordinate without sign.
-fn reach(corners: &[DVec3; 8]) -> f64 {
+fn reach(corners: &[DVec3]) -> f64 {
     corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
 }
 
 /// The outward normals of the edges of what the corners look like along `axis`.
-fn outline(corners: &[DVec3; 8], axis: usize, mut report: impl FnMut(DVec3)) {
+fn outline(corners: &[DVec3], axis: usize, mut report: impl FnMut(DVec3)) {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-    let mut flat = corners.map(|p| (p[i], p[j]));
+    let mut flat: Vec<_> = corners.iter().map(|p| (p[i], p[j])).collect();
     flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let turn = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0);
     // The lower chain, then the upper one (A. M. Andrew, 1979).
-    for upper in [false, true] {
-        let mut chain = [(0.0, 0.0); 8];
-        let mut length = 0;
-        for k in 0..8 {
-            let p = flat[if upper { 7 - k } else { k }];
-            while length > 1 && turn(chain[length - 2], chain[length - 1], p) <= 0.0 {
-                length -= 1;
+    for _ in 0..2 {
+        let mut chain: Vec<(f64, f64)> = Vec::with_capacity(flat.len());
+        for &p in &flat {
+            while let [.., a, b] = chain[..]
+                && turn(a, b, p) <= 0.0
+            {
+                chain.pop();
             }
-            chain[length] = p;
-            length += 1;
+            chain.push(p);
         }
-        for edge in chain[..length].windows(2) {
+        for edge in chain.windows(2) {
             let mut normal = DVec3::ZERO;
             normal[i] = edge[1].1 - edge[0].1;
             normal[j] = edge[0].0 - edge[1].0;
@@ -184,5 +200,6 @@ fn outline(corners: &[DVec3; 8], axis: usize, mut report: impl FnMut(DVec3)) {
                 report(normal);
             }
         }
+        flat.reverse();
     }
 }

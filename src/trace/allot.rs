@@ -12,7 +12,7 @@ use crate::scene::color::luminance;
 pub const EVEN: u32 = 8;
 /// Nobody gets less than this share, or more than that many: what the first samples have missed must have its
 /// chance.
-const LEAST: f64 = 0.25;
+const LEAST: f64 = 0.05;
 const MOST: f64 = 24.0;
 /// What is so many times as bright as half of the picture may have larger errors: they are seen no better, and a
 /// lamp's edge would get all samples.

@@ -54,8 +54,8 @@ pub struct Block {
     pub count: usize,
     /// Which of the wave's paths.
     pub paths: [u32; LANES],
-    /// Lights that nothing is in the way to, a bit for each.
-    pub clear: [u32; LANES],
+    /// See [`super::sightlines::Sightlines::of`].
+    pub known: [Option<u32>; LANES],
     /// Of the triangle; only in a block that is [`Block::find_points`].
     pub corners: [Rows; 3],
     /// Barycentric weights of the second corner (x), the third (y); z is not used.
@@ -83,7 +83,7 @@ pub struct Arrivals {
     pub contribution: Rows,
     /// Where on the light it comes from.
     pub target: Rows,
-    /// Nothing can be in the way.
+    /// That is all it brings: nothing is left to be tested.
     pub certain: [bool; LANES],
 }
 
@@ -116,7 +116,7 @@ impl Block {
         Self {
             count: 0,
             paths: [0; LANES],
-            clear: [0; LANES],
+            known: [None; LANES],
             corners: [blank(), blank(), blank()],
             weights: blank(),
             direction: blank(),
@@ -171,7 +171,7 @@ impl Job for FindPoints<'_> {
     }
 }
 
-/// One sample of a parallelogram light for each point.
+/// One sample of a parallelogram light for each point that is not `certain` yet.
 pub struct SampleQuad<'a> {
     /// The points.
     pub block: &'a Block,
@@ -217,15 +217,15 @@ impl Job for SampleQuad<'_> {
             let left = radiance[0] + (radiance[2] - radiance[0]) * place.b;
             let right = radiance[1] + (radiance[3] - radiance[1]) * place.b;
             let brought = block.throughput.get(i) * (left + (right - left) * place.a) * weight;
-            out.contribution.set(i, if lit { brought } else { Vec3::ZERO });
+            let brought = if lit { brought } else { Vec3::ZERO };
+            out.contribution.set(i, if out.certain[i] { out.contribution.get(i) } else { brought });
             out.target.set(i, offset(on_light, error_of(on_light), facing));
-            out.certain[i] = false;
         }
     }
 }
 
-/// All that a parallelogram light of one radiance brings to points that nothing keeps it from, `light` being its bit.
-/// Where it is too far or partly below the horizon, what is there stays.
+/// All that a parallelogram light of one radiance brings to those points that are `certain` to have nothing in its way.
+/// Those for which it is too small, or partly below the horizon, are certain no more.
 pub struct IntegrateQuad<'a> {
     /// The points.
     pub block: &'a Block,
@@ -235,8 +235,6 @@ pub struct IntegrateQuad<'a> {
     pub radiance: Vec3,
     /// Whether it emits to both sides.
     pub two_sided: bool,
-    /// Its bit in [`Block::clear`].
-    pub light: u32,
     /// What comes out.
     pub out: &'a mut Arrivals,
 }
@@ -246,17 +244,16 @@ impl Job for IntegrateQuad<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { block, quad, radiance, two_sided, light, out } = self;
+        let Self { block, quad, radiance, two_sided, out } = self;
         for i in 0..LANES {
             let (point, normal) = (block.position.get(i), block.normal.get(i));
-            let plain = quad.is_plain(point, normal) & quad.is_plain(point, block.geometric_normal.get(i));
+            let above = quad.is_above(point, normal) & quad.is_above(point, block.geometric_normal.get(i));
             let irradiance = quad.irradiance(point, normal);
             let irradiance = if two_sided { irradiance.abs() } else { irradiance };
             let irradiance = if irradiance > 0.0 { irradiance } else { 0.0 };
             let brought = block.throughput.get(i) * radiance * (irradiance * (1.0 / PI));
-            let certain = plain & (block.clear[i] >> light & 1 == 1);
-            out.contribution.set(i, if certain { brought } else { out.contribution.get(i) });
-            out.certain[i] = certain;
+            out.contribution.set(i, brought);
+            out.certain[i] &= above & quad.is_large(point);
         }
     }
 }

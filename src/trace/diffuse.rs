@@ -1,8 +1,6 @@
 //! Surfaces that only reflect evenly: most of what there is, shaded by whole blocks.
 //!
-//! And where nothing can be in the way of a light, it is computed instead of sampled: no shadow rays, and no noise.
-//! Whether that is so is asked once for the part of a triangle that a tile shows, whichever samples are in the batch:
-//! a sample's result does not depend on its company.
+//! Where it is known what is in the way of a light, it is computed instead of sampled: no shadow rays, and no noise.
 
 use super::block::{Arrivals, Block, Depart, Departures, IntegrateQuad, LANES, SampleQuad};
 use super::film::Tile;
@@ -11,22 +9,30 @@ use super::integrator::{
     power_heuristic,
 };
 use super::light::FlatLight;
+use super::quad::Quad;
 use super::shape_light::{Shape, ShapeLight};
+use super::sightlines::{Sightlines, Window};
 use super::surface::Interaction;
+use super::visible::{Blocker, irradiance};
 use super::{Integrator, TraceScene};
-use crate::bvh::{Hit, Ray, Shaft};
-use glam::{DVec3, UVec2, Vec2, Vec3};
+use crate::bvh::{Hit, Ray};
+use glam::{UVec2, Vec3};
 use std::f32::consts::PI;
 
 /// Where paths of a wave have met diffuse surfaces, and what is needed to go on from there.
 #[derive(Debug, Default)]
 pub(super) struct Diffuse {
-    /// Numbers of paths, by what their points need: those with a clear light, other flat ones, and the rest.
-    kinds: [Vec<(u32, u32)>; 3],
-    /// Rays through the corners of the tile, around it.
-    corners: Option<[Ray; 4]>,
-    /// That of the tile, which lends it.
-    clear_lights: ClearLights,
+    /// Paths by what their points need: where something is known of lights, elsewhere, and those on surfaces that are
+    /// textured, smooth or placed.
+    kinds: [Vec<Arrived>; 3],
+    /// If anybody wants to know what is in the way.
+    window: Option<Window>,
+    /// Whether camera rays may run into lights.
+    pub(super) lights_in_view: bool,
+    /// Those of the tile, which lends them.
+    sightlines: Sightlines,
+    /// What has been asked about triangles in this batch.
+    asked: Vec<((u32, u32), Option<u32>)>,
     /// Lights that have been counted in full, a bit for each, of each point of the block.
     counted: Vec<u32>,
     block: Option<Box<Block>>,
@@ -34,136 +40,107 @@ pub(super) struct Diffuse {
     departures: Box<Departures>,
 }
 
-/// Of some triangles the lights that are clear from their part of a tile.
-#[derive(Clone, Debug, Default)]
-pub(super) struct ClearLights(Vec<Known>);
-
-/// What is known is no part of the picture.
-impl PartialEq for ClearLights {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
-}
-
-/// (instance, triangle), and a bit for each light that is clear.
+/// Number of a path, and what [`Sightlines::of`] says.
 #[derive(Clone, Copy, Debug)]
-struct Known {
-    triangle: (u32, u32),
-    clear: u32,
+struct Arrived {
+    path: u32,
+    known: Option<u32>,
 }
 
-/// So many triangles are remembered at a time.
-const KNOWN: usize = 16;
-const NOTHING: Known = Known { triangle: (u32::MAX, u32::MAX), clear: 0 };
-
-impl ClearLights {
-    /// What is known of a triangle, or `find`s it out.
-    fn of(&mut self, hit: &Hit, find: impl FnOnce() -> u32) -> u32 {
-        if self.0.is_empty() {
-            self.0.resize(KNOWN, NOTHING);
-        }
-        let triangle = (hit.instance, hit.triangle);
-        let known = &mut self.0[(hit.triangle ^ hit.instance << 3) as usize % KNOWN];
-        if known.triangle != triangle {
-            *known = Known { triangle, clear: find() };
-        }
-        known.clear
-    }
-}
+/// So many answers are at hand.
+const ASKED: usize = 64;
 
 impl Diffuse {
     /// Begins with another batch.
     pub(super) fn enter(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2) {
-        let (low, high) = (tile.origin.as_vec2(), (tile.origin + tile.size).as_vec2());
-        let ray = |x: f32, y: f32| scene.viewpoint.ray(Vec2::new(x, y), size);
-        let around = || [ray(low.x, low.y), ray(high.x, low.y), ray(high.x, high.y), ray(low.x, high.y)];
-        self.corners = (scene.settings.shafts && scene.lights.samples_all(0)).then(around);
-        self.clear_lights = std::mem::take(&mut tile.clear_lights);
+        let window = Window::new(scene, tile, size);
+        self.lights_in_view = scene.lights.any_shape(|bounds| !window.hides(&bounds));
+        self.window = (scene.settings.shafts && scene.lights.samples_all(0)).then_some(window);
+        self.sightlines = std::mem::take(&mut tile.sightlines);
+        self.sightlines.tidy();
+        self.asked.clear();
+        self.asked.resize(ASKED, ((u32::MAX, u32::MAX), None));
     }
 
     /// Ends with it.
     pub(super) fn leave(&mut self, tile: &mut Tile) {
-        tile.clear_lights = std::mem::take(&mut self.clear_lights);
+        tile.sightlines = std::mem::take(&mut self.sightlines);
     }
 
     /// Notes that path number `path` ends in `hit`.
     pub(super) fn add(&mut self, scene: &TraceScene, path: usize, hit: &Hit, depth: u32) {
-        let clear = if depth == 0 { self.clear(scene, hit) } else { 0 };
+        let known = if depth == 0 { self.ask(scene, hit) } else { None };
         let data = &scene.geometry.instances[hit.instance as usize];
         let flat = data.mesh.normals.is_empty()
             && data.mesh.colors.is_empty()
             && scene.geometry.tlas.placements()[hit.instance as usize].is_identity()
             && scene.surface_at(hit).1.base_color_texture.is_none();
-        let kind = if !flat { 2 } else { usize::from(clear == 0) };
-        self.kinds[kind].push((path as u32, clear));
+        let kind = if !flat { 2 } else { usize::from(known.is_none()) };
+        self.kinds[kind].push(Arrived { path: path as u32, known });
     }
 
-    /// The lights that nothing keeps from the part of the triangle that the tile shows.
-    fn clear(&mut self, scene: &TraceScene, hit: &Hit) -> u32 {
-        let Some(corners) = &self.corners else { return 0 };
-        self.clear_lights.of(hit, || clear_lights(scene, corners, hit))
-    }
-}
-
-/// The lights that are clear from the patch that rays around a tile cut out of a triangle's plane. None if it is much
-/// larger than the triangle: then the answer would cost more than it is worth.
-fn clear_lights(scene: &TraceScene, around: &[Ray; 4], hit: &Hit) -> u32 {
-    let data = &scene.geometry.instances[hit.instance as usize];
-    let placement = &scene.geometry.tlas.placements()[hit.instance as usize];
-    let [a, b, c] = data.mesh.corners(hit.triangle as usize).map(|p| {
-        let p = p.as_dvec3();
-        if placement.is_identity() { p } else { placement.world_from_local().transform_point3(p) }
-    });
-    let normal = (b - a).cross(c - a);
-    let mut patch = [DVec3::ZERO; 4];
-    for (corner, ray) in patch.iter_mut().zip(around) {
-        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let t = normal.dot(a - origin) / normal.dot(direction);
-        if !(t > 0.0 && t.is_finite()) {
-            return 0;
+    fn ask(&mut self, scene: &TraceScene, hit: &Hit) -> Option<u32> {
+        let window = self.window.as_ref()?;
+        let triangle = (hit.instance, hit.triangle);
+        let asked = &mut self.asked[(hit.triangle ^ hit.instance << 3) as usize % ASKED];
+        if asked.0 != triangle {
+            *asked = (triangle, self.sightlines.of(scene, window, hit));
         }
-        *corner = origin + direction * t;
+        asked.1
     }
-    let across = (patch[2] - patch[0]).cross(patch[3] - patch[1]);
-    if normal.length_squared() < 0.25 * across.length_squared() {
-        return 0;
-    }
-    (0..scene.lights.len() as u32)
-        .filter(|&number| match scene.lights.get(number) {
-            FlatLight::Shape(ShapeLight { shape: Shape::Parallelogram(quad), .. }) => {
-                let shaft = Shaft::new(patch, quad.corners().map(Vec3::as_dvec3));
-                scene.lights.is_clear(&shaft, number) && scene.geometry.tlas.is_clear(&shaft)
-            }
-            _ => false,
-        })
-        .fold(0, |clear, number| clear | 1 << number)
 }
 
-/// What a parallelogram light brings: all of it where nothing is in the way, elsewhere by a sample each.
+/// What a parallelogram light brings: all of it where it is known what is in the way, elsewhere by a sample each.
 fn arrive_from_quad(
     scene: &TraceScene,
     block: &Block,
+    sightlines: &Sightlines,
     shape: &ShapeLight,
     light: u32,
     dimension: u32,
     out: &mut Arrivals,
 ) {
     let Shape::Parallelogram(quad) = &shape.shape else { return };
-    let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
     let isa = scene.geometry.tlas.isa();
-    let clear = block.clear[..block.count].iter().filter(|clear| *clear >> light & 1 == 1).count();
-    let whole = clear > 0 && radiance.iter().all(|r| *r == radiance[0]);
-    if whole && clear == block.count {
-        isa.run(IntegrateQuad { block, quad, radiance: radiance[0], two_sided, light, out });
-        if out.certain[..block.count].iter().all(|&certain| certain) {
-            return;
+    let mut missing = block.count;
+    out.certain = [false; LANES];
+    if shape.radiance.iter().all(|r| *r == shape.radiance[0]) {
+        let radiance = shape.radiance[0];
+        let blockers = |i: usize| block.known[i].and_then(|known| sightlines.blockers(known, light));
+        for i in 0..block.count {
+            out.certain[i] = blockers(i).is_some_and(<[Blocker]>::is_empty);
+        }
+        if out.certain[..block.count].contains(&true) {
+            isa.run(IntegrateQuad { block, quad, radiance, two_sided: shape.two_sided, out });
+        }
+        for i in 0..block.count {
+            if !out.certain[i]
+                && let Some(blockers) = blockers(i)
+                && let Some(irradiance) = seen_past(block, i, shape, quad, blockers)
+            {
+                out.contribution.set(i, block.throughput.get(i) * radiance * (irradiance / PI));
+                out.certain[i] = true;
+            }
+            missing -= usize::from(out.certain[i]);
         }
     }
-    let shared = scene.settings.integrator == Integrator::Path;
-    isa.run(SampleQuad { block, quad, radiance, two_sided, dimension, shared, out });
-    if whole {
-        isa.run(IntegrateQuad { block, quad, radiance: radiance[0], two_sided, light, out });
+    if missing > 0 {
+        let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
+        let shared = scene.settings.integrator == Integrator::Path;
+        isa.run(SampleQuad { block, quad, radiance, two_sided, dimension, shared, out });
     }
+}
+
+/// Irradiance at a point of a block from a light of radiance 1 past `blockers`, if it can be told.
+fn seen_past(block: &Block, i: usize, shape: &ShapeLight, quad: &Quad, blockers: &[Blocker]) -> Option<f32> {
+    let point = block.position.get(i);
+    if !shape.two_sided && (point - quad.corner).dot(quad.normal) <= 0.0 {
+        return Some(0.0);
+    }
+    if !quad.is_large(point) {
+        return None;
+    }
+    irradiance(quad, point, [block.normal.get(i), block.geometric_normal.get(i)], blockers)
 }
 
 impl Batch {
@@ -172,7 +149,7 @@ impl Batch {
         for kind in 0..3 {
             let points = std::mem::take(&mut self.diffuse.kinds[kind]);
             for chunk in points.chunks(LANES) {
-                let like = self.path(chunk[0].0 as usize).sampler;
+                let like = self.path(chunk[0].path as usize).sampler;
                 let mut block = self.diffuse.block.take().unwrap_or_else(|| Box::new(Block::new(like)));
                 self.fill(scene, &mut block, chunk, kind < 2);
                 self.diffuse.counted.clear();
@@ -188,13 +165,13 @@ impl Batch {
         }
     }
 
-    fn fill(&self, scene: &TraceScene, block: &mut Block, points: &[(u32, u32)], flat: bool) {
+    fn fill(&self, scene: &TraceScene, block: &mut Block, points: &[Arrived], flat: bool) {
         block.count = points.len();
-        for (i, &(number, clear)) in points.iter().enumerate() {
-            let path = self.path(number as usize);
-            let Some(hit) = &self.hits[number as usize] else { continue };
-            block.paths[i] = number;
-            block.clear[i] = clear;
+        for (i, arrived) in points.iter().enumerate() {
+            let path = self.path(arrived.path as usize);
+            let Some(hit) = &self.hits[arrived.path as usize] else { continue };
+            block.paths[i] = arrived.path;
+            block.known[i] = arrived.known;
             block.samplers.set(i, &path.sampler);
             let (instance, surface) = scene.surface_at(hit);
             let mut albedo = surface.material.base_color;
@@ -235,7 +212,8 @@ impl Batch {
             let dimension = base + LIGHT + 2 * light;
             match scene.lights.get(light) {
                 FlatLight::Shape(shape) if matches!(shape.shape, Shape::Parallelogram(_)) => {
-                    arrive_from_quad(scene, block, shape, light, dimension, &mut arrivals);
+                    let sightlines = &self.diffuse.sightlines;
+                    arrive_from_quad(scene, block, sightlines, shape, light, dimension, &mut arrivals);
                     self.take_arrivals(block, light, depth, &arrivals);
                 }
                 _ => {
@@ -251,13 +229,13 @@ impl Batch {
     fn take_arrivals(&mut self, block: &Block, light: u32, depth: u32, arrivals: &Arrivals) {
         for i in 0..block.count {
             let contribution = arrivals.contribution.get(i);
+            self.diffuse.counted[i] |= u32::from(arrivals.certain[i]) << light;
             if contribution == Vec3::ZERO {
                 continue;
             }
             let path = self.path(block.paths[i] as usize);
-            if arrivals.certain[i] || block.clear[i] >> light & 1 == 1 {
+            if arrivals.certain[i] {
                 self.radiance[path.entry as usize] += contribution;
-                self.diffuse.counted[i] |= u32::from(arrivals.certain[i]) << light;
                 continue;
             }
             let origin = block.origin.get(i);

@@ -5,7 +5,7 @@
 //! (an f32 sum of ones stops at 2²⁴). Even samples go to one half, odd samples to the other;
 //! the halves are scrambled independently, so their difference measures the error of their mean.
 
-use super::diffuse::ClearLights;
+use super::sightlines::Sightlines;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2, Vec3};
 
@@ -23,6 +23,7 @@ impl Sum {
     const FRACTION_BITS: i32 = 60;
     const LIMIT: f32 = (1u64 << 35) as f32;
 
+    #[inline]
     fn add(&mut self, sample: f32) {
         if sample.abs() < 4.0 {
             // A product with a power of two is exact, and what has digits to round is far below 2⁵³.
@@ -35,6 +36,7 @@ impl Sum {
     }
 
     /// For all magnitudes.
+    #[cold]
     fn add_any(&mut self, sample: f32) {
         let bits = sample.to_bits();
         let exponent = (bits >> 23 & 0xff) as i32;
@@ -66,6 +68,7 @@ pub struct Pixel {
 impl Pixel {
     /// Adds the linear RGB `radiance` of sample number `index`. False if it was dropped since it is
     /// not finite, or below −2³⁵ or above 2³⁵, where no sum of light should be.
+    #[inline]
     pub fn add(&mut self, index: u32, radiance: Vec3) -> bool {
         // Not `any(> limit)`: a NaN must fail too.
         if !radiance.to_array().iter().all(|c| c.abs() < Sum::LIMIT) {
@@ -77,6 +80,16 @@ impl Pixel {
         }
         self.counts[half] += 1;
         true
+    }
+
+    /// [`Pixel::add`] of many; returns how many were dropped.
+    pub fn add_all(&mut self, samples: impl Iterator<Item = (u32, Vec3)>) -> u64 {
+        let (mut all, mut dropped) = (*self, 0);
+        for (index, radiance) in samples {
+            dropped += u64::from(!all.add(index, radiance));
+        }
+        *self = all;
+        dropped
     }
 
     /// Mean radiance of all samples; black without any.
@@ -152,7 +165,7 @@ pub struct Tile {
     /// What the pixels hold is from before the last reset.
     stale: bool,
     /// What is known of its part of the scene until the next reset.
-    pub(super) clear_lights: ClearLights,
+    pub(super) sightlines: Sightlines,
     pixels: Vec<Pixel>,
 }
 
@@ -208,7 +221,7 @@ impl Film {
                     shares: [1.0; 2],
                     dropped: 0,
                     stale: false,
-                    clear_lights: ClearLights::default(),
+                    sightlines: Sightlines::default(),
                     pixels,
                 }
             })
@@ -225,7 +238,7 @@ impl Film {
             (tile.more, tile.shares) = ([0; 2], [1.0; 2]);
             tile.dropped = 0;
             tile.stale = true;
-            tile.clear_lights = ClearLights::default();
+            tile.sightlines = Sightlines::default();
         }
     }
 

@@ -122,9 +122,11 @@ impl Batch {
         self.diffuse.leave(tile);
         let mut dropped = 0;
         let pixels = tile.pixels_mut();
-        for (&(pixel, sample), &radiance) in self.keys.iter().zip(&self.radiance) {
-            let (index, ..) = self.pixels[pixel as usize];
-            dropped += u64::from(!pixels[index as usize].add(sample, radiance));
+        // All samples of one pixel, then of the next.
+        for (place, (index, ..)) in self.pixels.iter().enumerate() {
+            let own = || (place..self.radiance.len()).step_by(self.pixels.len());
+            let samples = own().map(|i| (self.keys[i].1, self.radiance[i]));
+            dropped += pixels[*index as usize].add_all(samples);
         }
         tile.dropped += dropped;
         match color {
@@ -216,7 +218,8 @@ impl Batch {
     fn arrive(&mut self, scene: &TraceScene, index: usize) {
         let (path, hit) = (&self.path(index), self.hits[index]);
         let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
-        if let Some(found) = scene.lights.closest(&before_hit) {
+        let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
+        if let Some(found) = may_meet.then(|| scene.lights.closest(&before_hit)).flatten() {
             let radiance = found.shape.emitted(&path.ray, &found.hit);
             let pdf = path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.normal, &found.hit));
             self.collect(scene, path, found.light, radiance, pdf);

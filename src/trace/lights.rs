@@ -175,6 +175,15 @@ impl Lights {
         })
     }
 
+    /// Whether one of the boxes around solid shapes is such a one.
+    #[must_use]
+    pub fn any_shape(&self, is: impl Fn(Aabb) -> bool) -> bool {
+        self.shape_lights.iter().any(|&light| match self.get(light) {
+            FlatLight::Shape(shape) => is(shape.shape.bounds()),
+            _ => false,
+        })
+    }
+
     fn shapes_on<'a, B>(
         &'a self,
         ray: &Ray,

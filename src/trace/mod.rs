@@ -21,8 +21,10 @@ pub mod sampler;
 pub mod scene;
 pub mod settings;
 pub mod shape_light;
+mod sightlines;
 pub mod surface;
 pub mod texture;
+pub mod visible;
 pub mod warp;
 
 pub use camera::Viewpoint;

@@ -114,24 +114,25 @@ impl Quad {
         -0.5 * sum
     }
 
-    /// Whether all of it is above the horizon of `normal`, and so large that [`Quad::irradiance`] is good for 20 bits.
+    /// Whether all of it is above the horizon of `normal`.
     #[inline(always)]
     #[must_use]
-    pub fn is_plain(&self, point: Vec3, normal: Vec3) -> bool {
+    pub fn is_above(&self, point: Vec3, normal: Vec3) -> bool {
+        let (first, by_u, by_v) = (normal.dot(self.corner - point), normal.dot(self.u), normal.dot(self.v));
+        (first > 0.0) & (first + by_u > 0.0) & (first + by_v > 0.0) & (first + by_u + by_v > 0.0)
+    }
+
+    /// Whether it looks so large that rounding leaves 16 bits of [`Quad::irradiance`] at least. And it is not so near that
+    /// the angle of an edge comes close to half a turn.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_large(&self, point: Vec3) -> bool {
         let d00 = self.corner - point;
-        let d10 = d00 + self.u;
-        let d01 = d00 + self.v;
-        let d11 = d10 + self.v;
-        let above = lesser(
-            lesser(normal.dot(d00), normal.dot(d10)),
-            lesser(normal.dot(d01), normal.dot(d11)),
-        );
-        let far2 = greater(
-            greater(d00.length_squared(), d10.length_squared()),
-            greater(d01.length_squared(), d11.length_squared()),
-        );
-        let shorter2 = lesser(self.u.length_squared(), self.v.length_squared());
-        above > 0.0 && shorter2 > 4e-4 * far2
+        let d11 = d00 + self.u + self.v;
+        let far2 = greater(d00.length_squared(), d11.length_squared());
+        let (u2, v2) = (self.u.length_squared(), self.v.length_squared());
+        let height = self.normal.dot(d00);
+        (lesser(u2, v2) > 4e-4 * far2) & (height * height > 1e-4 * greater(u2, v2))
     }
 }
 

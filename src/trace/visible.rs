@@ -1,0 +1,176 @@
+//! The part of a lamp that a point sees past a few triangles, exactly: penumbrae without noise.
+//!
+//! The lamp's parallelogram is cut along the planes through the point and each triangle's edges; what is inside of all
+//! of a triangle's planes is hidden. What is left are convex pieces, each with Lambert's closed form. This is K. Weiler
+//! and P. Atherton's "Hidden Surface Removal Using Polygon Area Sorting", SIGGRAPH 1977, with lamps for surfaces, as
+//! T. Nishita and E. Nakamae used it for shadows, "Continuous Tone Representation of Three-Dimensional Objects Taking
+//! Account of Shadows and Interreflection", 1985.
+
+use super::quad::{Quad, angle_over_sine};
+use glam::Vec3;
+
+/// Most corners of a piece: four, and one for each plane that cut it.
+const CORNERS: usize = 12;
+/// So many pieces may come of one lamp at one point.
+const PIECES: u32 = 64;
+
+/// Something convex that is in the way: a triangle, without what is behind the lamp's plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blocker {
+    corners: [Vec3; 4],
+    count: usize,
+}
+
+/// A convex polygon as seen from a point, by its corners relative to it.
+#[derive(Clone, Copy)]
+struct Piece {
+    corners: [Vec3; CORNERS],
+    count: usize,
+}
+
+impl Blocker {
+    /// What of the triangle is above the plane through `on` with `normal` by more than `tolerance`, in units of both; `None`
+    /// if nothing is.
+    #[must_use]
+    pub fn new(triangle: &[Vec3; 3], on: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
+        let mut piece = Piece { corners: [Vec3::ZERO; CORNERS], count: 3 };
+        piece.corners[..3].copy_from_slice(&triangle.map(|p| p - on));
+        if !piece.corners[..3].iter().any(|p| normal.dot(*p) > tolerance) {
+            return None;
+        }
+        let above = piece.inside(normal);
+        let mut corners = [Vec3::ZERO; 4];
+        let count = above.count.min(4);
+        for (to, from) in corners.iter_mut().zip(&above.corners[..count]) {
+            *to = *from + on;
+        }
+        (count > 2).then_some(Self { corners, count })
+    }
+}
+
+/// Irradiance at `point` with the first of `normals` from radiance 1 of what of `quad` is above both horizons and behind
+/// none of `blockers`. `None` if it would be in too many pieces.
+#[must_use]
+pub fn irradiance(quad: &Quad, point: Vec3, normals: [Vec3; 2], blockers: &[Blocker]) -> Option<f32> {
+    let [normal, geometric] = normals;
+    let mut piece = Piece { corners: [Vec3::ZERO; CORNERS], count: 4 };
+    for (to, corner) in piece.corners.iter_mut().zip(quad.corners()) {
+        *to = corner - point;
+    }
+    let mut budget = PIECES;
+    piece = piece.inside(normal);
+    if geometric != normal {
+        piece = piece.inside(geometric);
+    }
+    let sum = seen(piece, normal, point, blockers, &mut budget);
+    (budget > 0).then_some(sum.abs())
+}
+
+/// From what of `piece` is behind none of `blockers`.
+fn seen(mut piece: Piece, normal: Vec3, point: Vec3, blockers: &[Blocker], budget: &mut u32) -> f32 {
+    if piece.count < 3 || *budget == 0 {
+        return 0.0;
+    }
+    for (i, blocker) in blockers.iter().enumerate() {
+        let mut planes = [Vec3::ZERO; 4];
+        let count = blocker.planes(point, &mut planes);
+        let planes = &planes[..count];
+        // Outside of one of them is out of its reach: most are.
+        if count == 0 || planes.iter().any(|plane| piece.is_outside(*plane)) {
+            continue;
+        }
+        let mut sum = 0.0;
+        for plane in planes {
+            let outside = piece.inside(-*plane);
+            piece = piece.inside(*plane);
+            if outside.count > 2 {
+                *budget = budget.saturating_sub(1);
+                sum += seen(outside, normal, point, &blockers[i + 1..], budget);
+            }
+            if piece.count < 3 {
+                break;
+            }
+        }
+        // What is inside of all of them is hidden.
+        return sum;
+    }
+    piece.irradiance(normal)
+}
+
+impl Blocker {
+    /// Inward normals of the planes through `point` and its edges; none if it is seen edge-on.
+    fn planes(&self, point: Vec3, planes: &mut [Vec3; 4]) -> usize {
+        let [a, b, c, d] = self.corners.map(|p| p - point);
+        let side = a.cross(b).dot(c);
+        if side == 0.0 {
+            return 0;
+        }
+        let sign = side.signum();
+        planes[0] = a.cross(b) * sign;
+        planes[1] = b.cross(c) * sign;
+        if self.count == 3 {
+            planes[2] = c.cross(a) * sign;
+        } else {
+            planes[2] = c.cross(d) * sign;
+            planes[3] = d.cross(a) * sign;
+        }
+        self.count
+    }
+}
+
+impl Piece {
+    /// Whether no corner is inside.
+    fn is_outside(&self, plane: Vec3) -> bool {
+        self.corners[..self.count].iter().all(|p| plane.dot(*p) <= 0.0)
+    }
+
+    /// What is on the side to which `plane`, a normal, points.
+    ///
+    /// Reference: I. E. Sutherland, G. W. Hodgman, "Reentrant Polygon Clipping", CACM 17(1), 1974.
+    fn inside(&self, plane: Vec3) -> Self {
+        let mut out = Self { corners: [Vec3::ZERO; CORNERS], count: 0 };
+        if self.count == 0 {
+            return out;
+        }
+        let mut before = self.corners[self.count - 1];
+        let mut height_before = plane.dot(before);
+        for &here in &self.corners[..self.count] {
+            let height = plane.dot(here);
+            if (height > 0.0) != (height_before > 0.0) {
+                // From the inner end, so that both pieces get the same corner.
+                let (inner, outer) = if height > 0.0 { (height, height_before) } else { (height_before, height) };
+                let (from, to) = if height > 0.0 { (here, before) } else { (before, here) };
+                out.push(from + (to - from) * (inner / (inner - outer)));
+            }
+            if height > 0.0 {
+                out.push(here);
+            }
+            (before, height_before) = (here, height);
+        }
+        out
+    }
+
+    /// One corner too many is left out: so many planes never cut one piece by a visible part.
+    fn push(&mut self, corner: Vec3) {
+        if self.count < CORNERS {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
+    }
+
+    /// By the sum over its edges; its sign is that of the corners' sense of rotation.
+    fn irradiance(&self, normal: Vec3) -> f32 {
+        let corners = &self.corners[..self.count];
+        let mut before = corners[self.count - 1];
+        let mut length_before = before.length();
+        let mut sum = 0.0;
+        for &here in corners {
+            let length = here.length();
+            let scale = 1.0 / (length_before * length);
+            let cross = before.cross(here - before);
+            sum += normal.dot(cross) * scale * angle_over_sine(before.dot(here) * scale);
+            (before, length_before) = (here, length);
+        }
+        0.5 * sum
+    }
+}
