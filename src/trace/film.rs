@@ -156,10 +156,12 @@ pub struct Tile {
     pub size: UVec2,
     /// Index of the sample that comes next in each of its pixels, but for `more`.
     pub next_sample: u32,
-    /// Samples beyond `next_sample` that the pixels of either colour have (see [`Film::allot`]).
-    pub more: [u32; 2],
-    /// How many they get for each one that the picture gets on average.
-    shares: [f32; 2],
+    /// Samples beyond `next_sample` that each pixel has, in rows from the top. Empty before [`Film::allot`].
+    pub(super) more: Vec<u32>,
+    /// How many each gets for each one that the picture gets on average; as many.
+    shares: Vec<f32>,
+    /// Samples per pixel of the picture that all have their share of, if they have shares.
+    pub(super) complete: u32,
     /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
     pub dropped: u64,
     /// What the pixels hold is from before the last reset.
@@ -170,10 +172,11 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Pixels are coloured as a chess board; the first of a tile has colour 0.
+    /// What [`Tile::more`] is to be of a pixel when it has its share of `beyond` samples.
     #[must_use]
-    pub fn color(&self, pixel: u32) -> usize {
-        ((pixel % self.size.x + pixel / self.size.x) & 1) as usize
+    pub(super) fn goal(&self, pixel: usize, beyond: u32) -> u32 {
+        // Saturates.
+        (f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32
     }
 
     /// Rows from the top, to look at.
@@ -217,8 +220,9 @@ impl Film {
                     origin,
                     size,
                     next_sample: first_sample,
-                    more: [0; 2],
-                    shares: [1.0; 2],
+                    more: Vec::new(),
+                    shares: Vec::new(),
+                    complete: 0,
                     dropped: 0,
                     stale: false,
                     sightlines: Sightlines::default(),
@@ -235,7 +239,8 @@ impl Film {
         self.even_samples = 0;
         for tile in &mut self.tiles {
             tile.next_sample = first_sample;
-            (tile.more, tile.shares) = ([0; 2], [1.0; 2]);
+            tile.more.clear();
+            tile.shares.clear();
             tile.dropped = 0;
             tile.stale = true;
             tile.sightlines = Sightlines::default();
@@ -307,15 +312,21 @@ impl Film {
         })
     }
 
-    /// From now on gives the pixels of each tile and colour their own `shares` of all samples, of mean 1. Every
-    /// pixel must have the same number of samples, one at least.
+    /// From now on gives each pixel its own share of all samples, of mean 1; `shares` are in rows of the whole picture.
+    /// Every pixel must have the same number of samples, one at least.
     ///
     /// A picture stays unbiased only if how many samples a pixel gets does not depend on what they say: so
-    /// the share of one colour is to be found from pixels of the other.
-    pub fn allot(&mut self, shares: &[[f32; 2]]) {
+    /// the share of one pixel is to be found from others.
+    pub fn allot(&mut self, shares: &[f32]) {
         self.even_samples = self.complete_samples();
-        for (tile, &shares) in self.tiles.iter_mut().zip(shares) {
-            tile.shares = shares;
+        let across = self.size.x as usize;
+        for tile in &mut self.tiles {
+            let [x, y, width, height] = [tile.origin.x, tile.origin.y, tile.size.x, tile.size.y].map(|n| n as usize);
+            tile.shares.clear();
+            tile.shares.extend((y..y + height).flat_map(|y| &shares[y * across + x..][..width]));
+            tile.more.clear();
+            tile.more.resize(width * height, 0);
+            tile.complete = self.even_samples;
         }
     }
 
@@ -325,39 +336,29 @@ impl Film {
         self.even_samples > 0
     }
 
-    /// What [`Tile::more`] is when the tile has its share of `samples` per pixel.
+    /// Samples that each pixel had before [`Film::allot`]; 0 without it.
     #[must_use]
-    pub fn goal(&self, tile: &Tile, samples: u32) -> [u32; 2] {
-        let beyond = f64::from(samples.saturating_sub(self.even_samples));
-        // Saturates.
-        tile.shares.map(|share| (beyond * f64::from(share)).ceil() as u32)
+    pub fn even_samples(&self) -> u32 {
+        self.even_samples
     }
 
     /// Samples that every pixel has its share of.
     #[must_use]
     pub fn complete_samples(&self) -> u32 {
-        let even = self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample;
-        if !self.is_allotted() {
-            return even;
+        if self.is_allotted() {
+            return self.tiles.iter().map(|t| t.complete).min().unwrap_or(0);
         }
-        // Shares are rounded up to whole samples; what is missing is rounding of the division.
-        let beyond = |t: &Tile, color: usize| f64::from(t.more[color]) / f64::from(t.shares[color]) + 1e-6;
-        let least = self.tiles.iter().map(|t| beyond(t, 0).min(beyond(t, 1)));
-        even + least.fold(f64::INFINITY, f64::min) as u32
+        self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample
     }
 
     /// Samples a pixel has on average.
     #[must_use]
     pub fn mean_samples(&self) -> f64 {
-        let sum: f64 = self
-            .tiles
-            .iter()
-            .map(|t| {
-                let more = 0.5 * (f64::from(t.more[0]) + f64::from(t.more[1]));
-                (f64::from(t.next_sample - self.first_sample) + more) * f64::from(t.size.element_product())
-            })
-            .sum();
-        sum / f64::from(self.size.element_product())
+        let of = |t: &Tile| {
+            let even = u64::from(t.next_sample - self.first_sample) * u64::from(t.size.element_product());
+            even + t.more.iter().map(|&n| u64::from(n)).sum::<u64>()
+        };
+        self.tiles.iter().map(of).sum::<u64>() as f64 / f64::from(self.size.element_product())
     }
 
     /// Samples dropped because they were not finite.

@@ -55,11 +55,36 @@ pub(super) struct Shadow {
     pub(super) key: u32,
 }
 
+/// Which samples a tile is to get.
+#[derive(Clone, Copy, Debug)]
+pub enum Work {
+    /// All pixels those below index `until`.
+    Even {
+        /// The first that is not to be taken.
+        until: u32,
+    },
+    /// Each pixel its share.
+    Shares {
+        /// Samples per pixel of the picture beyond the even ones.
+        beyond: u32,
+    },
+}
+
+impl Default for Work {
+    fn default() -> Self {
+        Self::Even { until: 0 }
+    }
+}
+
+/// Samples that are followed together: more would only need more memory (a thread's buffers take about 1 MB).
+const TOGETHER: u32 = 2048;
+
 /// Buffers of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Batch {
-    /// Number in the tile, top left corner, samplers.
-    pixels: Vec<(u32, Vec2, [Sampler; 2])>,
+    /// Top left corners and samplers of the tile's pixels.
+    pixels: Vec<(Vec2, [Sampler; 2])>,
+    work: Work,
     pub(super) paths: Vec<Path>,
     pub(super) next: Vec<Path>,
     pub(super) shadows: Vec<Shadow>,
@@ -69,7 +94,7 @@ pub struct Batch {
     ignored: Vec<Option<(u32, u32)>>,
     blocked: Vec<bool>,
     pub(super) radiance: Vec<Vec3>,
-    /// Which of `pixels`, and which sample.
+    /// Which of `pixels`, and which sample: all of one pixel, then of the next.
     keys: Vec<(u32, u32)>,
 }
 
@@ -83,32 +108,42 @@ pub(super) const LIGHT: u32 = 4;
 pub(super) const ROULETTE_DEPTH: u32 = 4;
 
 impl Batch {
-    /// Adds the next `count` samples to each pixel of `tile`, or to those of one colour, for a picture of `size`.
-    pub fn render(
-        &mut self,
-        scene: &TraceScene,
-        tile: &mut Tile,
-        size: UVec2,
-        color: Option<usize>,
-        count: u32,
-        rays: &mut RayCounts,
-    ) {
-        self.diffuse.enter(scene, tile, size);
-        let first = tile.next_sample + color.map_or(0, |color| tile.more[color]);
-        self.pixels.clear();
-        let mut i = 0;
-        Sampler::tile(tile.origin, tile.size, scene.settings, |halves| {
-            if color.is_none_or(|color| tile.color(i) == color) {
-                let corner = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
-                self.pixels.push((i, corner.as_vec2(), halves));
-            }
-            i += 1;
-        });
+    /// Notes which samples of `tile` come next, as many as are followed together. False if there is none.
+    pub fn begin(&mut self, scene: &TraceScene, tile: &Tile, work: Work) -> bool {
         self.keys.clear();
-        self.rays.clear();
-        for sample in first..first + count {
-            self.look(scene, sample, size);
+        self.work = work;
+        let pixels = tile.size.element_product();
+        match work {
+            Work::Even { until } => {
+                let first = tile.next_sample;
+                let count = until.saturating_sub(first).min((TOGETHER / pixels).max(1));
+                self.keys.extend((0..pixels).flat_map(|i| (first..first + count).map(move |sample| (i, sample))));
+            }
+            Work::Shares { beyond } => {
+                for (i, &more) in (0..pixels).zip(&tile.more) {
+                    let room = TOGETHER - self.keys.len() as u32;
+                    let count = tile.goal(i as usize, beyond).saturating_sub(more).min(room);
+                    let first = tile.next_sample + more;
+                    self.keys.extend((first..first + count).map(|sample| (i, sample)));
+                }
+            }
         }
+        if self.keys.is_empty() {
+            return false;
+        }
+        self.pixels.clear();
+        Sampler::tile(tile.origin, tile.size, scene.settings, |halves| {
+            let i = self.pixels.len() as u32;
+            let corner = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
+            self.pixels.push((corner.as_vec2(), halves));
+        });
+        true
+    }
+
+    /// Adds the samples that [`Batch::begin`] has noted, of a picture of `size`.
+    pub fn render(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2, rays: &mut RayCounts) {
+        self.diffuse.enter(scene, tile, size);
+        self.look(scene, size);
         self.radiance.clear();
         self.radiance.resize(self.keys.len(), Vec3::ZERO);
         rays.camera += self.rays.len() as u64;
@@ -122,35 +157,37 @@ impl Batch {
         self.diffuse.leave(tile);
         let mut dropped = 0;
         let pixels = tile.pixels_mut();
-        // All samples of one pixel, then of the next.
-        for (place, (index, ..)) in self.pixels.iter().enumerate() {
-            let own = || (place..self.radiance.len()).step_by(self.pixels.len());
-            let samples = own().map(|i| (self.keys[i].1, self.radiance[i]));
-            dropped += pixels[*index as usize].add_all(samples);
+        let mut done = 0;
+        for run in self.keys.chunk_by(|a, b| a.0 == b.0) {
+            let samples = run.iter().zip(&self.radiance[done..]).map(|(key, radiance)| (key.1, *radiance));
+            dropped += pixels[run[0].0 as usize].add_all(samples);
+            done += run.len();
         }
         tile.dropped += dropped;
-        match color {
-            None => tile.next_sample += count,
-            Some(color) => tile.more[color] += count,
+        match self.work {
+            Work::Even { .. } => tile.next_sample += (self.keys.len() / self.pixels.len()) as u32,
+            Work::Shares { .. } => {
+                for key in &self.keys {
+                    tile.more[key.0 as usize] += 1;
+                }
+            }
         }
     }
 
-    /// Queues camera rays: sample number `sample` of each pixel.
-    fn look(&mut self, scene: &TraceScene, sample: u32, size: UVec2) {
-        for (chunk, pixels) in (0..).zip(self.pixels.chunks(LANES)) {
-            let samplers = pixels.iter().map(|(.., halves)| halves[sample as usize & 1].at(sample));
-            let row = SamplerRow::of(samplers);
+    /// Makes the camera rays.
+    fn look(&mut self, scene: &TraceScene, size: UVec2) {
+        self.rays.clear();
+        self.rays.resize(self.keys.len(), Ray::new(Vec3::ZERO, Vec3::Z));
+        for (keys, rays) in self.keys.chunks(LANES).zip(self.rays.chunks_mut(LANES)) {
             let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-            for (i, (_, corner, _)) in pixels.iter().enumerate() {
+            let mut samplers = SamplerRow::new(self.pixels[keys[0].0 as usize].1[0]);
+            for (i, &(pixel, sample)) in keys.iter().enumerate() {
+                let (corner, halves) = &self.pixels[pixel as usize];
                 (x[i], y[i]) = (corner.x, corner.y);
+                samplers.set(i, &halves[sample as usize & 1].at(sample));
             }
-            let first = self.rays.len();
-            self.rays.resize(first + pixels.len(), Ray::new(Vec3::ZERO, Vec3::Z));
-            let rays = &mut self.rays[first..];
-            let viewpoint = scene.viewpoint;
-            scene.geometry.tlas.isa().run(Look { viewpoint, size, samplers: &row, corners: [&x, &y], rays });
-            let number = |i: usize| (chunk * LANES + i) as u32;
-            self.keys.extend((0..pixels.len()).map(|i| (number(i), sample)));
+            let (viewpoint, samplers) = (scene.viewpoint, &samplers);
+            scene.geometry.tlas.isa().run(Look { viewpoint, size, samplers, corners: [&x, &y], rays });
         }
     }
 
@@ -163,7 +200,7 @@ impl Batch {
         let (pixel, sample) = self.keys[index];
         Path {
             entry: index as u32,
-            sampler: self.pixels[pixel as usize].2[sample as usize & 1].at(sample),
+            sampler: self.pixels[pixel as usize].1[sample as usize & 1].at(sample),
             ray: self.rays[index],
             throughput: Vec3::ONE,
             depth: 0,

@@ -124,19 +124,6 @@ impl<const N: usize> SamplerRow<N> {
         Self { seeds: [like.seed; N], indices: [like.index; N], like }
     }
 
-    /// Those, all spread alike, and what is beyond them as the last.
-    ///
-    /// # Panics
-    /// If there is none.
-    #[must_use]
-    pub fn of(mut samplers: impl Iterator<Item = Sampler>) -> Self {
-        let mut row = Self::new(samplers.next().expect("one at least"));
-        for (i, sampler) in (1..N).zip(samplers) {
-            row.set(i, &sampler);
-        }
-        row
-    }
-
     /// Puts one in its place; it must be spread as the others are.
     #[inline(always)]
     pub fn set(&mut self, i: usize, sampler: &Sampler) {

@@ -10,7 +10,7 @@ use super::quad::{Quad, angle_over_sine};
 use glam::Vec3;
 
 /// Most corners of a piece: four, and one for each plane that cut it.
-const CORNERS: usize = 12;
+const CORNERS: usize = 8;
 /// So many pieces may come of one lamp at one point.
 const PIECES: u32 = 64;
 
@@ -73,22 +73,20 @@ fn seen(mut piece: Piece, normal: Vec3, point: Vec3, blockers: &[Blocker], budge
     }
     for (i, blocker) in blockers.iter().enumerate() {
         let mut planes = [Vec3::ZERO; 4];
-        let count = blocker.planes(point, &mut planes);
-        let planes = &planes[..count];
         // Outside of one of them is out of its reach: most are.
-        if count == 0 || planes.iter().any(|plane| piece.is_outside(*plane)) {
+        if !blocker.reaches(&piece, point, &mut planes) {
             continue;
         }
         let mut sum = 0.0;
-        for plane in planes {
+        for plane in &planes[..blocker.count] {
             let outside = piece.inside(-*plane);
-            piece = piece.inside(*plane);
             if outside.count > 2 {
-                *budget = budget.saturating_sub(1);
+                piece = piece.inside(*plane);
+                *budget = budget.saturating_sub(if outside.is_full() || piece.is_full() { PIECES } else { 1 });
                 sum += seen(outside, normal, point, &blockers[i + 1..], budget);
-            }
-            if piece.count < 3 {
-                break;
+                if piece.count < 3 {
+                    break;
+                }
             }
         }
         // What is inside of all of them is hidden.
@@ -98,28 +96,38 @@ fn seen(mut piece: Piece, normal: Vec3, point: Vec3, blockers: &[Blocker], budge
 }
 
 impl Blocker {
-    /// Inward normals of the planes through `point` and its edges; none if it is seen edge-on.
-    fn planes(&self, point: Vec3, planes: &mut [Vec3; 4]) -> usize {
+    /// Whether it may hide some of the piece. Then `planes` are the inward normals of those through `point` and its
+    /// edges.
+    fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; 4]) -> bool {
         let [a, b, c, d] = self.corners.map(|p| p - point);
-        let side = a.cross(b).dot(c);
+        let first = a.cross(b);
+        let side = first.dot(c);
+        // Seen edge-on.
         if side == 0.0 {
-            return 0;
+            return false;
         }
         let sign = side.signum();
-        planes[0] = a.cross(b) * sign;
+        planes[0] = first * sign;
+        if piece.is_outside(planes[0]) {
+            return false;
+        }
         planes[1] = b.cross(c) * sign;
+        if piece.is_outside(planes[1]) {
+            return false;
+        }
         if self.count == 3 {
             planes[2] = c.cross(a) * sign;
-        } else {
-            planes[2] = c.cross(d) * sign;
-            planes[3] = d.cross(a) * sign;
+            return !piece.is_outside(planes[2]);
         }
-        self.count
+        planes[2] = c.cross(d) * sign;
+        planes[3] = d.cross(a) * sign;
+        !piece.is_outside(planes[2]) && !piece.is_outside(planes[3])
     }
 }
 
 impl Piece {
     /// Whether no corner is inside.
+    #[inline]
     fn is_outside(&self, plane: Vec3) -> bool {
         self.corners[..self.count].iter().all(|p| plane.dot(*p) <= 0.0)
     }
@@ -150,7 +158,11 @@ impl Piece {
         out
     }
 
-    /// One corner too many is left out: so many planes never cut one piece by a visible part.
+    /// Perhaps too many corners for it.
+    fn is_full(&self) -> bool {
+        self.count == CORNERS
+    }
+
     fn push(&mut self, corner: Vec3) {
         if self.count < CORNERS {
             self.corners[self.count] = corner;
