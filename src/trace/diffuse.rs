@@ -13,7 +13,7 @@ use super::quad::Quad;
 use super::shape_light::{Shape, ShapeLight};
 use super::sightlines::{Sightlines, Window};
 use super::surface::Interaction;
-use super::visible::{Blocker, irradiance};
+use super::visible::{HIDDEN, Reach, irradiance};
 use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
 use glam::{UVec2, Vec3};
@@ -106,17 +106,17 @@ fn arrive_from_quad(
     out.certain = [false; LANES];
     if shape.radiance.iter().all(|r| *r == shape.radiance[0]) {
         let radiance = shape.radiance[0];
-        let blockers = |i: usize| block.known[i].and_then(|known| sightlines.blockers(known, light));
+        let which = in_the_way(scene, block, sightlines, quad, light);
         for i in 0..block.count {
-            out.certain[i] = blockers(i).is_some_and(<[Blocker]>::is_empty);
+            out.certain[i] = which[i] == Some(0);
         }
         if out.certain[..block.count].contains(&true) {
             isa.run(IntegrateQuad { block, quad, radiance, two_sided: shape.two_sided, out });
         }
         for i in 0..block.count {
             if !out.certain[i]
-                && let Some(blockers) = blockers(i)
-                && let Some(irradiance) = seen_past(block, i, shape, quad, blockers)
+                && let Some(which) = which[i]
+                && let Some(irradiance) = seen_past(block, i, shape, quad, sightlines, light, which)
             {
                 out.contribution.set(i, block.throughput.get(i) * radiance * (irradiance / PI));
                 out.certain[i] = true;
@@ -131,16 +131,54 @@ fn arrive_from_quad(
     }
 }
 
-/// Irradiance at a point of a block from a light of radiance 1 past `blockers`, if it can be told.
-fn seen_past(block: &Block, i: usize, shape: &ShapeLight, quad: &Quad, blockers: &[Blocker]) -> Option<f32> {
+/// For each point of a block which of the known blockers may hide some of a light; `None` where they are not known.
+fn in_the_way(
+    scene: &TraceScene,
+    block: &Block,
+    sightlines: &Sightlines,
+    quad: &Quad,
+    light: u32,
+) -> [Option<u32>; LANES] {
+    let mut which = [None; LANES];
+    let mut done = 0;
+    // Neighbours are mostly on the same triangle.
+    while let Some(first) = (done..block.count).find(|&i| block.known[i].is_some()) {
+        let known = block.known[first];
+        let own = |i: &usize| block.known[*i] == known;
+        let end = first + (first..block.count).take_while(own).count();
+        if let Some(blockers) = known.and_then(|known| sightlines.blockers(known, light)) {
+            let mut out = [0; LANES];
+            if !blockers.is_empty() {
+                scene.geometry.tlas.isa().run(Reach { block, quad, blockers, out: &mut out });
+            }
+            for i in first..end {
+                which[i] = Some(out[i]);
+            }
+        }
+        done = end;
+    }
+    which
+}
+
+/// Irradiance at a point of a block from a light of radiance 1 past those of its blockers, if it can be told.
+fn seen_past(
+    block: &Block,
+    i: usize,
+    shape: &ShapeLight,
+    quad: &Quad,
+    sightlines: &Sightlines,
+    light: u32,
+    which: u32,
+) -> Option<f32> {
     let point = block.position.get(i);
-    if !shape.two_sided && (point - quad.corner).dot(quad.normal) <= 0.0 {
+    if which == HIDDEN || !shape.two_sided && (point - quad.corner).dot(quad.normal) <= 0.0 {
         return Some(0.0);
     }
     if !quad.is_large(point) {
         return None;
     }
-    irradiance(quad, point, [block.normal.get(i), block.geometric_normal.get(i)], blockers)
+    let blockers = sightlines.blockers(block.known[i]?, light)?;
+    irradiance(quad, point, [block.normal.get(i), block.geometric_normal.get(i)], blockers, which)
 }
 
 impl Batch {

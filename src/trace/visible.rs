@@ -6,7 +6,9 @@
 //! T. Nishita and E. Nakamae used it for shadows, "Continuous Tone Representation of Three-Dimensional Objects Taking
 //! Account of Shadows and Interreflection", 1985.
 
+use super::block::{Block, LANES};
 use super::quad::{Quad, angle_over_sine};
+use crate::bvh::simd::{Job, Simd};
 use glam::Vec3;
 
 /// Most corners of a piece: four, and one for each plane that cut it.
@@ -49,9 +51,15 @@ impl Blocker {
 }
 
 /// Irradiance at `point` with the first of `normals` from radiance 1 of what of `quad` is above both horizons and behind
-/// none of `blockers`. `None` if it would be in too many pieces.
+/// none of those `blockers` whose bits are set in `which`. `None` if it would be in too many pieces.
 #[must_use]
-pub fn irradiance(quad: &Quad, point: Vec3, normals: [Vec3; 2], blockers: &[Blocker]) -> Option<f32> {
+pub fn irradiance(
+    quad: &Quad,
+    point: Vec3,
+    normals: [Vec3; 2],
+    blockers: &[Blocker],
+    which: u32,
+) -> Option<f32> {
     let [normal, geometric] = normals;
     let mut piece = Piece { corners: [Vec3::ZERO; CORNERS], count: 4 };
     for (to, corner) in piece.corners.iter_mut().zip(quad.corners()) {
@@ -62,16 +70,25 @@ pub fn irradiance(quad: &Quad, point: Vec3, normals: [Vec3; 2], blockers: &[Bloc
     if geometric != normal {
         piece = piece.inside(geometric);
     }
-    let sum = seen(piece, normal, point, blockers, &mut budget);
+    let sum = seen(piece, normal, point, blockers, which, &mut budget);
     (budget > 0).then_some(sum.abs())
 }
 
 /// From what of `piece` is behind none of `blockers`.
-fn seen(mut piece: Piece, normal: Vec3, point: Vec3, blockers: &[Blocker], budget: &mut u32) -> f32 {
+fn seen(
+    mut piece: Piece,
+    normal: Vec3,
+    point: Vec3,
+    blockers: &[Blocker],
+    mut which: u32,
+    budget: &mut u32,
+) -> f32 {
     if piece.count < 3 || *budget == 0 {
         return 0.0;
     }
-    for (i, blocker) in blockers.iter().enumerate() {
+    while which != 0 {
+        let blocker = &blockers[which.trailing_zeros() as usize];
+        which &= which - 1;
         let mut planes = [Vec3::ZERO; 4];
         // Outside of one of them is out of its reach: most are.
         if !blocker.reaches(&piece, point, &mut planes) {
@@ -83,7 +100,7 @@ fn seen(mut piece: Piece, normal: Vec3, point: Vec3, blockers: &[Blocker], budge
             if outside.count > 2 {
                 piece = piece.inside(*plane);
                 *budget = budget.saturating_sub(if outside.is_full() || piece.is_full() { PIECES } else { 1 });
-                sum += seen(outside, normal, point, &blockers[i + 1..], budget);
+                sum += seen(outside, normal, point, blockers, which, budget);
                 if piece.count < 3 {
                     break;
                 }
@@ -93,6 +110,59 @@ fn seen(mut piece: Piece, normal: Vec3, point: Vec3, blockers: &[Blocker], budge
         return sum;
     }
     piece.irradiance(normal)
+}
+
+/// Which of some blockers may hide some of a lamp from each point of a block.
+pub struct Reach<'a> {
+    /// The points.
+    pub block: &'a Block,
+    /// The lamp.
+    pub quad: &'a Quad,
+    /// No more than 32.
+    pub blockers: &'a [Blocker],
+    /// A bit for each of them; all are set where one hides all of it.
+    pub out: &'a mut [u32; LANES],
+}
+
+/// All of a lamp is hidden.
+pub const HIDDEN: u32 = u32::MAX;
+
+impl Job for Reach<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { block, quad, blockers, out } = self;
+        let lamp = quad.corners();
+        *out = [0; LANES];
+        for (number, blocker) in (0..u32::BITS).zip(blockers) {
+            let [a, b, c, d] = blocker.corners;
+            let triangle = blocker.count == 3;
+            for (i, which) in out.iter_mut().enumerate() {
+                let point = block.position.get(i);
+                let (a, b, c, d) = (a - point, b - point, c - point, d - point);
+                let lamp = [lamp[0] - point, lamp[1] - point, lamp[2] - point, lamp[3] - point];
+                let first = a.cross(b);
+                let side = first.dot(c);
+                let sign = if side > 0.0 { 1.0 } else { -1.0 };
+                let (out_0, in_0) = sides(first * sign, &lamp);
+                let (out_1, in_1) = sides(b.cross(c) * sign, &lamp);
+                let (out_2, in_2) = sides(c.cross(if triangle { a } else { d }) * sign, &lamp);
+                let (out_3, in_3) = sides(d.cross(a) * sign, &lamp);
+                let outside = (out_0 | out_1 | out_2 | (out_3 & !triangle)) | (side == 0.0);
+                let inside = in_0 & in_1 & in_2 & (in_3 | triangle) & !outside;
+                let bit = if outside { 0 } else { 1 << number };
+                *which |= if inside { HIDDEN } else { bit };
+            }
+        }
+    }
+}
+
+/// Whether all of a lamp is outside of a plane, and whether all is inside.
+#[inline(always)]
+fn sides(plane: Vec3, lamp: &[Vec3; 4]) -> (bool, bool) {
+    let (a, b, c, d) = (plane.dot(lamp[0]), plane.dot(lamp[1]), plane.dot(lamp[2]), plane.dot(lamp[3]));
+    ((a <= 0.0) & (b <= 0.0) & (c <= 0.0) & (d <= 0.0), (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0))
 }
 
 impl Blocker {
