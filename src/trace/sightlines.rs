@@ -9,7 +9,7 @@ use super::light::FlatLight;
 use super::lights::ALL_LIGHTS;
 use super::quad::Quad;
 use super::shape_light::Shape;
-use super::visible::Blocker;
+use super::visible::{Blocker, join};
 use crate::bvh::{Aabb, Hit, Ray, Shaft};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 
@@ -163,6 +163,7 @@ impl Sightlines {
             self.blockers.truncate(first);
             return None;
         }
+        join(&mut self.blockers, first);
         Some((first as u32, self.blockers.len() as u32))
     }
 }

@@ -35,7 +35,7 @@ impl Blocker {
     /// if nothing is.
     #[must_use]
     pub fn new(triangle: &[Vec3; 3], on: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
-        let mut piece = Piece { corners: [Vec3::ZERO; CORNERS], count: 3 };
+        let mut piece = Piece { count: 3, ..Piece::EMPTY };
         piece.corners[..3].copy_from_slice(&triangle.map(|p| p - on));
         if !piece.corners[..3].iter().any(|p| normal.dot(*p) > tolerance) {
             return None;
@@ -50,6 +50,20 @@ impl Blocker {
     }
 }
 
+/// Makes one of each two triangles that make a flat convex quadrilateral: most that people build are made of such.
+pub fn join(blockers: &mut Vec<Blocker>, first: usize) {
+    let mut i = first;
+    while i < blockers.len() {
+        if let Some((k, joined)) =
+            (i + 1..blockers.len()).find_map(|k| Some((k, blockers[i].joined(&blockers[k])?)))
+        {
+            blockers[i] = joined;
+            blockers.swap_remove(k);
+        }
+        i += 1;
+    }
+}
+
 /// Irradiance at `point` with the first of `normals` from radiance 1 of what of `quad` is above both horizons and behind
 /// none of those `blockers` whose bits are set in `which`. `None` if it would be in too many pieces.
 #[must_use]
@@ -61,7 +75,7 @@ pub fn irradiance(
     which: u32,
 ) -> Option<f32> {
     let [normal, geometric] = normals;
-    let mut piece = Piece { corners: [Vec3::ZERO; CORNERS], count: 4 };
+    let mut piece = Piece { count: 4, ..Piece::EMPTY };
     for (to, corner) in piece.corners.iter_mut().zip(quad.corners()) {
         *to = corner - point;
     }
@@ -96,9 +110,10 @@ fn seen(
         }
         let mut sum = 0.0;
         for plane in &planes[..blocker.count] {
-            let outside = piece.inside(-*plane);
+            let (mut inside, mut outside) = (Piece::EMPTY, Piece::EMPTY);
+            piece.split(*plane, &mut inside, &mut outside);
             if outside.count > 2 {
-                piece = piece.inside(*plane);
+                piece = inside;
                 *budget = budget.saturating_sub(if outside.is_full() || piece.is_full() { PIECES } else { 1 });
                 sum += seen(outside, normal, point, blockers, which, budget);
                 if piece.count < 3 {
@@ -166,6 +181,33 @@ fn sides(plane: Vec3, lamp: &[Vec3; 4]) -> (bool, bool) {
 }
 
 impl Blocker {
+    /// Both in one, if they are triangles that make a flat convex quadrilateral.
+    fn joined(&self, other: &Self) -> Option<Self> {
+        if self.count != 3 || other.count != 3 {
+            return None;
+        }
+        // a and b of this one's edge, from any of its corners on; the other has it the other way round or the same.
+        (0..3).find_map(|i| {
+            let [a, b, c] = [0, 1, 2].map(|k| self.corners[(i + k) % 3]);
+            let third = other.corners[..3].iter().find(|p| **p != a && **p != b)?;
+            let shared = |p: Vec3| other.corners[..3].contains(&p);
+            if !shared(a) || !shared(b) {
+                return None;
+            }
+            let corners = [a, *third, b, c];
+            let turns = [0, 1, 2, 3].map(|k| {
+                let [p, q, r] = [0, 1, 2].map(|m| corners[(k + m) % 4].as_dvec3());
+                (q - p).cross(r - q)
+            });
+            let normal = turns[1];
+            // The fourth corner is as near to the others' plane as f32 can say, and all turns go one way.
+            let off = normal.dot((third - a).as_dvec3()).abs();
+            let size = normal.length() * (c - a).as_dvec3().length();
+            let flat = turns.iter().all(|turn| turn.dot(normal) > 0.0) && off <= 1e-6 * size;
+            flat.then_some(Self { corners, count: 4 })
+        })
+    }
+
     /// Whether it may hide some of the piece. Then `planes` are the inward normals of those through `point` and its
     /// edges.
     fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; 4]) -> bool {
@@ -196,6 +238,8 @@ impl Blocker {
 }
 
 impl Piece {
+    const EMPTY: Self = Self { corners: [Vec3::ZERO; CORNERS], count: 0 };
+
     /// Whether no corner is inside.
     #[inline]
     fn is_outside(&self, plane: Vec3) -> bool {
@@ -203,29 +247,34 @@ impl Piece {
     }
 
     /// What is on the side to which `plane`, a normal, points.
+    fn inside(&self, plane: Vec3) -> Self {
+        let (mut inside, mut outside) = (Self::EMPTY, Self::EMPTY);
+        self.split(plane, &mut inside, &mut outside);
+        inside
+    }
+
+    /// Adds what is on the side to which `plane`, a normal, points, and what is on the other, to two empty pieces. They
+    /// have the corners in the plane in common.
     ///
     /// Reference: I. E. Sutherland, G. W. Hodgman, "Reentrant Polygon Clipping", CACM 17(1), 1974.
-    fn inside(&self, plane: Vec3) -> Self {
-        let mut out = Self { corners: [Vec3::ZERO; CORNERS], count: 0 };
-        if self.count == 0 {
-            return out;
-        }
-        let mut before = self.corners[self.count - 1];
+    fn split(&self, plane: Vec3, inside: &mut Self, outside: &mut Self) {
+        let Some(&last) = self.corners[..self.count].last() else { return };
+        let mut before = last;
         let mut height_before = plane.dot(before);
         for &here in &self.corners[..self.count] {
             let height = plane.dot(here);
             if (height > 0.0) != (height_before > 0.0) {
-                // From the inner end, so that both pieces get the same corner.
-                let (inner, outer) = if height > 0.0 { (height, height_before) } else { (height_before, height) };
-                let (from, to) = if height > 0.0 { (here, before) } else { (before, here) };
-                out.push(from + (to - from) * (inner / (inner - outer)));
+                let crossing = before + (here - before) * (height_before / (height_before - height));
+                inside.push(crossing);
+                outside.push(crossing);
             }
             if height > 0.0 {
-                out.push(here);
+                inside.push(here);
+            } else {
+                outside.push(here);
             }
             (before, height_before) = (here, height);
         }
-        out
     }
 
     /// Perhaps too many corners for it.
