@@ -9,7 +9,7 @@ use crate::scene::color::luminance;
 use glam::DVec3;
 
 /// Even samples per pixel before shares are given out.
-pub const EVEN: u32 = 8;
+pub const EVEN: u32 = 4;
 /// Nobody gets less than this share, or more than that many: what the first samples have missed must have its
 /// chance.
 const LEAST: f64 = 0.05;
