@@ -84,6 +84,13 @@ pub fn irradiance(
     if geometric != normal {
         piece = piece.inside(geometric);
     }
+    // Nothing cuts it: to the bit what it is where nobody asks.
+    let reached =
+        |i: u32| which >> i & 1 == 1 && blockers[i as usize].reaches(&piece, point, &mut [Vec3::ZERO; 4]);
+    let all_above = quad.is_above(point, normal) && quad.is_above(point, geometric);
+    if all_above && !(0..blockers.len() as u32).any(reached) {
+        return Some(quad.irradiance(point, normal).abs());
+    }
     let sum = seen(piece, normal, point, blockers, which, &mut budget);
     (budget > 0).then_some(sum.abs())
 }
