@@ -2,11 +2,13 @@
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
-use penumbra::cli::{Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs};
+use penumbra::cli::{
+    CheckArgs, Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs,
+};
 use penumbra::farm::{self, is_film};
 use penumbra::image::compare::compare_files;
 use penumbra::image::{ImageError, PictureFormat, save};
-use penumbra::load::{LoadReport, built_in_scenes};
+use penumbra::load::{Card, LoadReport, Verdict, built_in_scenes};
 use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use penumbra::report::{Report, ReportError, measure_all, write};
@@ -30,6 +32,7 @@ mod exit {
     pub const SCENE_NOT_READABLE: u8 = 3;
     pub const BEFORE_TARGET: u8 = 4;
     pub const ABOVE_LIMIT: u8 = 5;
+    pub const NOT_ALL_AS_IN_THE_FILE: u8 = 6;
     pub const INTERRUPTED: u8 = 130;
 }
 
@@ -37,6 +40,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let code = match cli.command {
         Some(Command::Render(args)) => headless(&args.scene, &args.output),
+        Some(Command::Check(args)) => check(&args),
         Some(Command::Compare(args)) => compare(&args),
         Some(Command::Merge(args)) => merge(&args),
         Some(Command::Report(args)) => report(&args),
@@ -232,10 +236,10 @@ fn finish(summary: &RenderSummary, output: &OutputArgs) -> u8 {
 }
 
 fn tell(report: &LoadReport) {
-    for line in &report.warnings {
+    for line in report.warnings() {
         eprintln!("warning: {line}");
     }
-    for line in &report.decisions {
+    for line in report.decisions() {
         eprintln!("note: {line}");
     }
 }
@@ -317,6 +321,32 @@ impl Bar {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Prints the report card of each file.
+fn check(args: &CheckArgs) -> u8 {
+    let options = args.load_options();
+    let mut worst = Verdict::Valid;
+    for file in &args.files {
+        let card = Card::check(file, &options);
+        worst = worst.max(card.verdict);
+        if !args.json {
+            println!("{}", card.text());
+            continue;
+        }
+        match serde_json::to_string(&card) {
+            Ok(json) => println!("{json}"),
+            Err(error) => {
+                eprintln!("error: {error}");
+                return exit::FAILED;
+            }
+        }
+    }
+    match worst {
+        Verdict::Valid => 0,
+        Verdict::Repaired => exit::NOT_ALL_AS_IN_THE_FILE,
+        Verdict::Refused => exit::SCENE_NOT_READABLE,
     }
 }
 

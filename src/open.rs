@@ -4,7 +4,7 @@ use crate::app::{App, FrameBudget};
 use crate::bvh::Isa;
 use crate::image::develop::suggest_exposure;
 use crate::image::{Display, ToneMap};
-use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
+use crate::load::{Kind, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Projection, Transform};
 use crate::sync::Instructions;
 use crate::trace::{Film, Integrator, RenderSettings, Sampling};
@@ -135,9 +135,14 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
             Some(0.0) => {}
             Some(stops) => {
                 app.world.resource_mut::<Display>().exposure = stops;
-                report.decisions.push(format!("the picture would be far off: exposed by {stops:+.2} EV"));
+                let what = format!("the picture would be far off: exposed by {stops:+.2} EV");
+                report.add(Kind::Decided, &source.to_string(), what);
             }
-            None => report.warnings.push("no light reaches the camera: the picture is black".to_owned()),
+            None => report.add(
+                Kind::Decided,
+                &source.to_string(),
+                "no light reaches the camera: the picture is black",
+            ),
         }
     }
     let build_seconds = start.elapsed().as_secs_f64();

@@ -1,10 +1,12 @@
 //! The collections of valid and of broken files beside the project, if they are there.
+//!
+//! `cargo test --release --test shared_scenes -- --nocapture` prints the table: file, expected, got.
 
 #![expect(clippy::print_stderr, reason = "a test that did not run must say so")]
 
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use penumbra::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
+use penumbra::load::{Card, LoadError, LoadOptions, LoadReport, Remark, SceneSource, Verdict, load};
 use penumbra::scene::{ActiveCamera, GlobalTransform, Instance, Mesh, SceneBounds};
 use std::path::{Path, PathBuf};
 
@@ -23,6 +25,41 @@ fn load_file(path: &Path) -> (World, Result<LoadReport, LoadError>) {
     let mut world = World::new();
     let result = load(&mut world, &SceneSource::File(path.to_path_buf()), &LoadOptions::default());
     (world, result)
+}
+
+/// One row of the table: what was to happen and what did.
+fn row(
+    file: &str,
+    expected: &str,
+    result: &Result<LoadReport, LoadError>,
+    failed: Option<&String>,
+) -> String {
+    let card = Card::new(file, result);
+    let got = match (&card.error, card.verdict) {
+        (Some(error), _) => format!("refused: {}", error.replace('|', "/")),
+        (None, Verdict::Valid) => format!("valid, {} triangles", card.triangles),
+        (None, _) => {
+            let parts = [
+                (&card.repaired, "repaired"),
+                (&card.ignored, "ignored"),
+                (&card.approximated, "approximated"),
+            ];
+            let count = |remarks: &[Remark]| remarks.iter().map(|remark| remark.count).sum::<usize>();
+            let parts: Vec<String> = parts
+                .iter()
+                .filter(|(remarks, _)| !remarks.is_empty())
+                .map(|(remarks, what)| format!("{what} {}", count(remarks)))
+                .collect();
+            format!("{} triangles; {}", card.triangles, parts.join(", "))
+        }
+    };
+    let verdict = failed.map_or("as expected".to_owned(), |why| format!("**{why}**"));
+    format!("| {file} | {expected} | {got} | {verdict} |")
+}
+
+/// Prints a table; without `--nocapture` only a failing test shows it.
+fn print_table(rows: &[String]) {
+    eprintln!("| file | expected | got | |\n|---|---|---|---|\n{}", rows.join("\n"));
 }
 
 /// Area of all triangles after transforms.
@@ -88,10 +125,10 @@ fn every_shared_scene_loads_with_its_triangles() {
     let Some(root) = shared("every_shared_scene_loads_with_its_triangles") else {
         return;
     };
-    let table = std::fs::read_to_string(root.join("scenes/README.md")).unwrap();
+    let expectations = std::fs::read_to_string(root.join("scenes/README.md")).unwrap();
     let mut failures = Vec::new();
-    let mut rows = 0;
-    for line in table.lines() {
+    let mut table = Vec::new();
+    for line in expectations.lines() {
         let cells: Vec<&str> = line.split('|').map(str::trim).collect();
         let [_, file, triangles, ..] = cells[..] else {
             continue;
@@ -99,18 +136,19 @@ fn every_shared_scene_loads_with_its_triangles() {
         let Ok(expected) = triangles.parse::<usize>() else {
             continue;
         };
-        rows += 1;
         let (mut world, result) = load_file(&root.join("scenes").join(file));
-        match result {
-            Err(error) => failures.push(format!("{file}: refused: {error}")),
+        let failure = match &result {
+            Err(error) => Some(format!("refused: {error}")),
             Ok(report) if report.triangles != expected => {
-                failures.push(format!("{file}: {} triangles, expected {expected}", report.triangles));
+                Some(format!("{} triangles, expected {expected}", report.triangles))
             }
-            Ok(_) => {
-                failures.extend(broken_promise(&mut world).map(|what| format!("{file}: {what}")));
-            }
-        }
+            Ok(_) => broken_promise(&mut world),
+        };
+        table.push(row(file, &format!("{expected} triangles"), &result, failure.as_ref()));
+        failures.extend(failure.map(|why| format!("{file}: {why}")));
     }
+    print_table(&table);
+    let rows = table.len();
     assert!(rows >= 60, "only {rows} rows in the table");
     assert!(failures.is_empty(), "{} of {rows} failed:\n{}", failures.len(), failures.join("\n"));
 }
@@ -122,6 +160,22 @@ struct Expected<'a> {
     triangles: &'a str,
     area: &'a str,
     words: &'a str,
+}
+
+impl std::fmt::Display for Expected<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { outcome, triangles, words, .. } = self;
+        match *outcome {
+            "refuse" => write!(f, "refuse"),
+            _ if *triangles == "-" => write!(f, "{outcome}"),
+            _ => write!(f, "{outcome}, {triangles} triangles"),
+        }?;
+        if words.is_empty() || *words == "." {
+            Ok(())
+        } else {
+            write!(f, ", say {}", words.replace('|', " / "))
+        }
+    }
 }
 
 /// Whether a message has one of the words of a pattern like `a|b|no .*c|v1\.0`, whatever the case.
@@ -160,7 +214,7 @@ fn judge(row: &Expected<'_>, world: &mut World, result: &Result<LoadReport, Load
         }
         Ok(report) => report,
     };
-    let said = report.warnings.join("\n");
+    let said = report.warnings().join("\n");
     let area = area(world);
     match row.outcome {
         "refuse" => Some("accepted".to_owned()),
@@ -185,10 +239,10 @@ fn every_broken_file_has_an_allowed_outcome() {
         return;
     };
     let mut failures = Vec::new();
-    let mut rows = 0;
-    for table in ["EXPECT.own.tsv", "EXPECT.public.tsv"] {
-        let table = std::fs::read_to_string(root.join("bad-input").join(table)).unwrap();
-        for line in table.lines().skip(1) {
+    let mut table = Vec::new();
+    for expectations in ["EXPECT.own.tsv", "EXPECT.public.tsv"] {
+        let expectations = std::fs::read_to_string(root.join("bad-input").join(expectations)).unwrap();
+        for line in expectations.lines().skip(1) {
             let cells: Vec<&str> = line.split('\t').collect();
             let [file, outcome, triangles, area, words, ..] = cells[..] else {
                 continue;
@@ -197,16 +251,18 @@ fn every_broken_file_has_an_allowed_outcome() {
             if !path.is_file() {
                 continue;
             }
-            rows += 1;
             let start = std::time::Instant::now();
             let (mut world, result) = load_file(&path);
-            let row = Expected { file, outcome, triangles, area, words };
-            failures.extend(judge(&row, &mut world, &result).map(|why| format!("{file} [{outcome}]: {why}")));
-            if start.elapsed().as_secs() >= 10 {
-                failures.push(format!("{file}: took {:?}", start.elapsed()));
-            }
+            let seconds = start.elapsed().as_secs_f64();
+            let expected = Expected { file, outcome, triangles, area, words };
+            let slow = (seconds >= 10.0).then(|| format!("took {seconds:.1} s"));
+            let failure = judge(&expected, &mut world, &result).or(slow);
+            table.push(row(file, &expected.to_string(), &result, failure.as_ref()));
+            failures.extend(failure.map(|why| format!("{file} [{outcome}]: {why}")));
         }
     }
+    print_table(&table);
+    let rows = table.len();
     assert!(rows >= 400, "only {rows} rows in the tables");
     assert!(failures.is_empty(), "{} of {rows} failed:\n{}", failures.len(), failures.join("\n"));
 }

@@ -23,7 +23,7 @@ use values::{exposure, isa, noise, resolution, sample_range, seconds, vector, vi
 #[command(version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
 #[command(
     after_help = "Exit codes: 0 done; 1 failed (also: a film is damaged or does not fit); 2 bad command line; 3 scene not readable; \
-4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved)."
+4 stopped before the target; 5 --fail-above exceeded; 6 `check`: loads, but not all of it as it is in the file; 130 interrupted (what there was is saved)."
 )]
 pub struct Cli {
     /// What to do; nothing opens the window.
@@ -40,6 +40,8 @@ pub struct Cli {
 pub enum Command {
     /// Render to a file, without a window
     Render(RenderArgs),
+    /// Load files and say what was found, mended, left out and approximated
+    Check(CheckArgs),
     /// Say how much picture A differs from reference B
     Compare(CompareArgs),
     /// Make one picture of films that hold different samples of it
@@ -166,6 +168,24 @@ pub struct SceneArgs {
     /// What happens above white
     #[arg(long, value_enum)]
     pub tone_map: Option<ToneMapArg>,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Exit codes, the worst of all files: 0 valid; 6 loads, but something in it was mended, left out or \
+approximated; 3 refused."
+)]
+pub struct CheckArgs {
+    /// .gltf, .glb, .obj or .toml files, or built-in scenes
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<String>,
+    /// Settings file to use instead of the .toml beside each scene
+    #[arg(long, value_name = "FILE")]
+    pub scene_settings: Option<PathBuf>,
+    /// Print one JSON object a file, each on a line
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `compare`.
@@ -357,6 +377,14 @@ impl SceneArgs {
                 view_angle: self.camera_view_angle,
             },
         }
+    }
+}
+
+impl CheckArgs {
+    /// How to load.
+    #[must_use]
+    pub fn load_options(&self) -> LoadOptions {
+        LoadOptions { scene_settings: self.scene_settings.clone() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the program decides when a file has no camera or no light, and how large the scene is.
 
-use super::report::Sink;
+use super::report::{Kind, Sink};
 use crate::scene::{
     ActiveCamera, Camera, GlobalTransform, Instance, Light, Material, Mesh, Projection, SceneBounds,
     Transform, Visible, propagate_transforms,
@@ -33,7 +33,7 @@ pub(super) fn complete(file: &str, camera: Option<Entity>, sink: &mut Sink<'_>) 
     let ball = SceneBounds { center: 0.5 * (bounds.min + bounds.max), radius };
     sink.world.insert_resource(ball);
     if survey.bounds.is_none() {
-        sink.warn(format!("{file}: no triangle to see in it: the picture will be empty"));
+        sink.ignored(file, "", "no triangle to see in it: the picture will be empty");
     }
     let first = sink.report.cameras.first().map(|&(_, camera)| camera);
     let active = camera.or(first).unwrap_or_else(|| frame(file, &survey, &bounds, ball, sink));
@@ -158,10 +158,8 @@ fn drop_far_instances(file: &str, sink: &mut Sink<'_>) {
         sink.world.entity_mut(entity).remove::<Instance>();
     }
     if !far.is_empty() {
-        sink.warn(format!(
-            "{file}: {} instances left out: their transform takes them beyond the range of 1e18",
-            far.len()
-        ));
+        let what = "instances left out: their transform takes them beyond the range of 1e18";
+        sink.remark(Kind::Ignored, file, "", what.to_owned(), far.len());
     }
 }
 
@@ -189,7 +187,7 @@ fn frame(file: &str, survey: &Survey, bounds: &Box3, ball: SceneBounds, sink: &m
     sink.report.cameras.push((name.to_owned(), camera));
     let side = if one_sided { "the side its surfaces face" } else { "the front, above and right" };
     let rest = if survey.trimmed { "; far outliers are outside the picture" } else { "" };
-    sink.decide(format!("{file}: no camera in it; looks at the whole scene from {side}{rest}"));
+    sink.decide(file, format!("no camera in it; looks at the whole scene from {side}{rest}"));
     camera
 }
 
@@ -233,5 +231,8 @@ fn add_light(file: &str, camera: Entity, ball: SceneBounds, sink: &mut Sink<'_>)
         Transform::default(),
         Light::Environment { radiance: Vec3::splat(FILL_RADIANCE) },
     ));
-    sink.decide(format!("{file}: no light in it; a soft key light shines from up left behind the camera, with a dim environment"));
+    sink.decide(
+        file,
+        "no light in it; a soft key light shines from up left behind the camera, with a dim environment",
+    );
 }

@@ -1,5 +1,6 @@
 //! From what a file says about triangles to a [`TriangleMesh`] that keeps its promises.
 
+use super::report::{Kind, Sink};
 use crate::scene::TriangleMesh;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
@@ -37,8 +38,8 @@ pub(super) struct Mended {
 }
 
 impl Mended {
-    /// One line for each kind.
-    pub(super) fn lines(&self) -> Vec<String> {
+    /// A remark for each kind.
+    pub(super) fn tell(&self, file: &str, place: &str, sink: &mut Sink<'_>) {
         let kinds = [
             (self.not_finite, "triangles dropped: a position is not finite"),
             (self.too_far, "triangles dropped: a position is beyond the range of 1e18"),
@@ -47,7 +48,9 @@ impl Mended {
             (self.uvs, "texture coordinates not finite, set to 0"),
             (self.colors, "vertex colours not finite, set to white"),
         ];
-        kinds.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect()
+        for (count, what) in kinds.into_iter().filter(|(count, _)| *count > 0) {
+            sink.remark(Kind::Repaired, file, place, what.to_owned(), count);
+        }
     }
 }
 

@@ -10,6 +10,7 @@
 //! is not there: every count is checked against the bytes that must hold it.
 
 mod builtin;
+mod card;
 mod error;
 mod framing;
 mod geometry;
@@ -21,8 +22,9 @@ mod settings;
 mod source;
 
 pub use builtin::{BuiltIn, built_in_scenes};
+pub use card::{Card, Verdict};
 pub use error::{LoadError, ReadError};
-pub use report::LoadReport;
+pub use report::{Found, Kind, LoadReport, Remark};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
 use crate::scene::Transform;
@@ -31,6 +33,7 @@ use bevy_ecs::prelude::*;
 use report::Sink;
 use settings::{Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Where a scene comes from.
@@ -73,6 +76,16 @@ impl SceneSource {
     }
 }
 
+impl fmt::Display for SceneSource {
+    /// The path, or the name of the built-in scene.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::BuiltIn(name) => f.write_str(name),
+        }
+    }
+}
+
 /// What the caller wants from [`load`].
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
@@ -87,7 +100,7 @@ pub struct LoadOptions {
 pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> Result<LoadReport, LoadError> {
     let mut sink = Sink::new(world);
     match load_into(source, options, &mut sink) {
-        Ok(()) => Ok(sink.finish()),
+        Ok(()) => Ok(sink.finish(&source.to_string())),
         Err(error) => {
             sink.undo();
             Err(error)
@@ -122,10 +135,13 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         settings.spawn_lights(sink)?;
     }
     for name in materials.unused() {
-        let line =
-            format!("{file}: [material.{name}] in the settings: no material of that name in the scene");
-        sink.warn(line);
+        sink.ignored(
+            &file,
+            &format!("[material.{name}]"),
+            "settings for a material that is not in the scene",
+        );
     }
+    sink.count();
     framing::complete(&file, active, sink);
     Ok(())
 }
@@ -190,15 +206,13 @@ fn sidecar(
         .map_err(|source| LoadError::Read { file: file.clone(), source })?;
     let settings = Settings::parse(&file, Folder::of(&path), &bytes)?;
     if settings.has_models() && !asked_for {
-        sink.decide(format!(
-            "{file}: has [[model]] and so is a scene of its own, not the settings of this one"
-        ));
+        sink.decide(&file, "has [[model]] and so is a scene of its own, not the settings of this one");
         return Ok(None);
     }
     if settings.has_models() {
-        sink.warn(format!("{file}: its [[model]] tables are ignored; open the file itself to see them"));
+        sink.ignored(&file, "", "its [[model]] tables; open the file itself to see them");
     } else {
-        sink.decide(format!("{file}: settings read"));
+        sink.decide(&file, "settings read");
     }
     Ok(Some(settings))
 }

@@ -1,7 +1,7 @@
 //! Image files → texels. A picture that cannot be had is a warning and a magenta checker, never an error.
 
 use super::error::ReadError;
-use super::report::Sink;
+use super::report::{Kind, Sink};
 use crate::scene::Texels;
 use image::error::ImageError;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
@@ -25,6 +25,9 @@ pub(super) struct Picture<'a> {
     pub(super) strict: bool,
 }
 
+/// What happened to a picture.
+struct Note(Kind, String);
+
 /// Decodes all pictures side by side; `file` is the scene that names them.
 pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Arc<Texels>> {
     let mut budget = MOST_TEXELS_TOGETHER;
@@ -37,7 +40,7 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
             fits
         })
         .collect();
-    let decoded: Vec<(Arc<Texels>, Vec<String>)> = pictures
+    let decoded: Vec<(Arc<Texels>, Vec<Note>)> = pictures
         .par_iter()
         .zip(affordable)
         .map(|(picture, affordable)| {
@@ -48,7 +51,7 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
                 Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
             };
             let texels = result.unwrap_or_else(|why| {
-                remarks.push(format!("{why}; a magenta checker stands in"));
+                remarks.push(Note(Kind::Ignored, format!("{why}; a magenta checker stands in")));
                 stand_in()
             });
             (Arc::new(texels), remarks)
@@ -58,8 +61,8 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
         .into_iter()
         .zip(pictures)
         .map(|((texels, remarks), picture)| {
-            for remark in remarks {
-                sink.warn(format!("{file}: {}: {remark}", picture.label));
+            for Note(kind, what) in remarks {
+                sink.remark(kind, file, &picture.label, what, 1);
             }
             texels
         })
@@ -80,7 +83,7 @@ fn texel_count(bytes: &[u8]) -> Option<u64> {
 }
 
 /// Decodes one picture, by its first bytes and not by its name.
-fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texels, String> {
+fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels, String> {
     if let Some(format) = foreign_format(bytes) {
         return Err(format!("image format {format} is not supported"));
     }
@@ -91,10 +94,11 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texel
         return Err("image format not recognised".to_owned());
     };
     if strict && !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP) {
-        remarks.push(format!("image format {format:?} is not allowed in glTF; used all the same"));
+        let what = format!("image format {format:?} is not allowed in glTF; used all the same");
+        remarks.push(Note(Kind::Repaired, what));
     }
     if format == ImageFormat::Jpeg && !has_jpeg_end(bytes) {
-        remarks.push("JPEG image is truncated; the missing part is grey".to_owned());
+        remarks.push(Note(Kind::Repaired, "JPEG image is truncated; the missing part is grey".to_owned()));
     }
     let mut decoder = reader.into_decoder().map_err(|error| describe(&error))?;
     let (width, height) = decoder.dimensions();
@@ -109,10 +113,11 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texel
     limits.max_alloc = Some(16 * MOST_TEXELS);
     decoder.set_limits(limits).map_err(|error| describe(&error))?;
     if format == ImageFormat::Jpeg && jpeg_components(bytes) == Some(4) {
-        remarks.push("CMYK JPEG image: its colours are approximate".to_owned());
+        remarks.push(Note(Kind::Approximated, "CMYK JPEG image: its colours are approximate".to_owned()));
     }
     if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
-        remarks.push("image with high dynamic range: cut at 1 and kept in 8 bits".to_owned());
+        let what = "image with high dynamic range: cut at 1 and kept in 8 bits";
+        remarks.push(Note(Kind::Approximated, what.to_owned()));
     }
     let rgba = image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
     let (width, height) = rgba.dimensions();

@@ -16,7 +16,7 @@ fn sees(world: &World, point: DVec3) -> bool {
 #[test]
 fn a_file_without_camera_and_light_gets_both_and_says_so() {
     let (mut world, report) = loaded("a.obj", &format!("{QUAD}f 1 2 3 4\n"));
-    let decisions = report.decisions.join("\n");
+    let decisions = report.decisions().join("\n");
     assert_says(&decisions, "no camera in it");
     assert_says(&decisions, "no light in it");
     for corner in [[0., 0.], [1., 0.], [1., 1.], [0., 1.]] {
@@ -52,7 +52,7 @@ fn far_outliers_do_not_shrink_the_scene() {
     text += "v 100000 0 0\nv 100000 0.01 0\nv 100000 0 0.01\nf -3 -2 -1\n";
     let (world, report) = loaded("a.obj", &text);
     assert!(world.resource::<SceneBounds>().radius < 3.0);
-    assert_says(&report.decisions.join("\n"), "outliers");
+    assert_says(&report.decisions().join("\n"), "outliers");
 }
 
 #[test]
@@ -66,6 +66,6 @@ fn an_emissive_material_is_light_enough() {
 fn an_empty_scene_still_has_a_camera() {
     let (world, report) = loaded("a.obj", "# nothing\n");
     assert_eq!(report.triangles, 0);
-    assert_says(&report.warnings.join("\n"), "nothing to see");
+    assert_says(&report.warnings().join("\n"), "nothing to see");
     assert!(world.get::<Camera>(world.resource::<ActiveCamera>().0).is_some());
 }

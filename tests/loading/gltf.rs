@@ -10,7 +10,7 @@ fn a_primitive_without_normals_or_indices_is_flat_and_light_grey() {
     assert!(mesh.normals.is_empty());
     assert_eq!(mesh.uvs[2], Vec2::new(0.0, 1.0));
     assert_eq!(named::<Material>(&mut world, "default"), Material::default());
-    assert_says(&report.decisions.join("\n"), "light grey");
+    assert_says(&report.decisions().join("\n"), "light grey");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn materials_keep_their_factors_textures_and_samplers() {
         "textures":[{"source":0,"sampler":0}],"samplers":[{"magFilter":9728,"wrapS":33071,"wrapT":33648}],"images":[{"uri":"a%20b.png"}]"#;
     let text = gltf_triangle("", r#","material":0"#, more);
     let (mut world, report) = loaded_all(&[("a.gltf", text.as_bytes()), ("a b.png", &png([1, 2, 3, 4]))]);
-    assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+    assert!(report.warnings().is_empty(), "{:?}", report.warnings());
     let material = named::<Material>(&mut world, "m");
     assert_eq!(
         (material.base_color, material.opacity, material.alpha),
@@ -165,7 +165,7 @@ fn punctual_lights_are_photometric_and_keep_their_angles() {
         lights(&mut world),
         [Light::Spot { intensity: Vec3::new(1.0, 0.5, 0.0), inner_angle: 0.25, outer_angle: 0.5 }]
     );
-    assert_says(&report.decisions.join("\n"), "candela");
+    assert_says(&report.decisions().join("\n"), "candela");
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn extensions_are_named_when_required_and_warned_of_when_used() {
         "scene.gltf: needs KHR_draco_mesh_compression, which Penumbra cannot read; export it again without Draco compression",
     );
     let (_, report) = loaded("a.gltf", &with("extensionsUsed"));
-    assert_says(&report.warnings.join("\n"), "KHR_draco_mesh_compression");
+    assert_says(&report.warnings().join("\n"), "KHR_draco_mesh_compression");
 }
 
 #[test]

@@ -151,15 +151,15 @@ fn every_built_in_scene_loads_without_a_warning() {
         let mut world = World::new();
         let report =
             load(&mut world, &source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-        assert!(report.warnings.is_empty(), "{}: {:?}", scene.name, report.warnings);
+        assert!(report.warnings().is_empty(), "{}: {:?}", scene.name, report.warnings());
         assert!(report.triangles > 0 && !report.cameras.is_empty(), "{}", scene.name);
         let shines = world.query::<&Light>().iter(&world).count()
             + world.query::<&Material>().iter(&world).filter(|m| m.emission != Vec3::ZERO).count();
         assert!(shines > 0, "{}: dark", scene.name);
         assert!(
-            !report.decisions.iter().any(|line| line.contains("no light") || line.contains("no camera")),
+            !report.decisions().iter().any(|line| line.contains("no light") || line.contains("no camera")),
             "{:?}",
-            report.decisions
+            report.decisions()
         );
     }
 }

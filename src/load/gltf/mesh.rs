@@ -89,9 +89,7 @@ impl Meshes {
             parts.push(part);
         }
         let done = geometry::finish(geometry::merge(parts));
-        for line in done.mended.lines() {
-            sink.warn(format!("{}: {label}: {line}", document.file));
-        }
+        done.mended.tell(document.file, &label, sink);
         let name = mesh.name.clone().unwrap_or(label);
         let entity = (!done.mesh.triangles.is_empty())
             .then(|| sink.spawn((Name::new(name), Mesh(Arc::new(done.mesh)))));
@@ -116,10 +114,8 @@ fn read_primitive(
         return Err(document.broken(place, "unknown mode (what the vertices form)"));
     };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-        sink.warn(format!(
-            "{file}: {place}: mode {} (points or lines) has no triangles, skipped",
-            mode.as_gl_enum()
-        ));
+        let what = format!("mode {} (points or lines) has no triangles", mode.as_gl_enum());
+        sink.ignored(file, place, what);
         return Ok(None);
     }
     let attribute = |semantic: Semantic, width: &[usize]| -> Result<Option<Elements<'_>>, LoadError> {
@@ -141,7 +137,7 @@ fn read_primitive(
     let normals = attribute(Semantic::Normals, &[3])?;
     let mut uvs = attribute(Semantic::TexCoords(uv_set), &[2])?;
     if uvs.is_none() && uv_set != 0 {
-        sink.warn(format!("{file}: {place}: no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
+        sink.repaired(file, place, format!("no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
         uvs = attribute(Semantic::TexCoords(0), &[2])?;
     }
     let colors = attribute(Semantic::Colors(0), &[3, 4])?;

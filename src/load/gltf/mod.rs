@@ -178,7 +178,9 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
     let ignored: Vec<&str> =
         head.extensions_used.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect();
     if !ignored.is_empty() {
-        sink.warn(format!("{file}: extensions not supported and ignored: {}", ignored.join(", ")));
+        for name in ignored {
+            sink.ignored(file, "", format!("extension {name} is not supported"));
+        }
     }
     Ok(())
 }

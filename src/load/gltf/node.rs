@@ -38,7 +38,7 @@ pub(super) fn spawn_scene(
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
-        sink.decide(format!("{}: no node in it; shows each mesh once", document.file));
+        sink.decide(document.file, "no node in it; shows each mesh once");
         for i in 0..document.root.meshes.len() {
             let built = meshes.get(document, &Index::new(i as u32), None, &mut palette, "file", sink)?;
             let entity = sink.spawn((Name::new(format!("mesh {i}")), Transform::default(), ChildOf(root)));
@@ -164,7 +164,7 @@ fn placement(document: &Document<'_>, i: usize, sink: &mut Sink<'_>) -> Result<D
         } else {
             "rotation is not a unit quaternion: normalised"
         };
-        sink.warn(format!("{}: node {i}: {what}", document.file));
+        sink.repaired(document.file, &format!("node {i}"), what);
     }
     Ok(affine)
 }
@@ -217,11 +217,11 @@ fn scene_roots(
     };
     if root.scenes.len() > 1 {
         let shown = root.scene.as_ref().map_or(0, Index::value);
-        sink.decide(format!("{file}: has {} scenes; shows scene {shown}", root.scenes.len()));
+        sink.decide(file, format!("has {} scenes; shows scene {shown}", root.scenes.len()));
     }
     let Some(scene) = scene else {
         if !parents.is_empty() {
-            sink.decide(format!("{file}: no scene in it; shows all nodes"));
+            sink.decide(file, "no scene in it; shows all nodes");
         }
         return Ok((0..parents.len()).filter(|&i| parents[i].is_none()).collect());
     };
@@ -239,7 +239,7 @@ fn scene_roots(
     let mut roots = Vec::new();
     for node in scene.nodes.iter().map(Index::value) {
         if shown_above[node] || !std::mem::take(&mut listed[node]) {
-            sink.warn(format!("{file}: scene: node {node} is listed although it is shown already"));
+            sink.repaired(file, &format!("node {node}"), "listed in the scene although it is shown already");
         } else {
             roots.push(node);
         }

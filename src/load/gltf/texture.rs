@@ -56,11 +56,8 @@ impl<'a> Textures<'a> {
                 let user = format!("material {i}");
                 let texture = document.at(&root.textures, used.index, "texture", &user)?;
                 let Some(source) = source_of(texture) else {
-                    sink.warn(format!(
-                        "{}: texture {} has no image source: white",
-                        document.file,
-                        used.index.value()
-                    ));
+                    let place = format!("texture {}", used.index.value());
+                    sink.repaired(document.file, &place, "texture has no image source: white");
                     continue;
                 };
                 let user = format!("texture {}", used.index.value());
@@ -129,11 +126,8 @@ fn sampling(
     let Some(Sampler { wrap_s, wrap_t, mag_filter, min_filter, .. }) =
         document.root.samplers.get(sampler.value())
     else {
-        sink.warn(format!(
-            "{}: texture {index} names sampler {}, which does not exist",
-            document.file,
-            sampler.value()
-        ));
+        let what = format!("names sampler {}, which does not exist", sampler.value());
+        sink.repaired(document.file, &format!("texture {index}"), what);
         return Default::default();
     };
     let mut unknown = false;
@@ -158,7 +152,8 @@ fn sampling(
         _ => Filter::Bilinear,
     };
     if unknown {
-        sink.warn(format!("{}: sampler {}: unknown wrap or filter mode", document.file, sampler.value()));
+        let place = format!("sampler {}", sampler.value());
+        sink.repaired(document.file, &place, "unknown wrap or filter mode, the default instead");
     }
     (wrap, filter)
 }

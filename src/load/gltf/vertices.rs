@@ -124,10 +124,8 @@ impl Numbers {
 
 fn leftover(document: &Document<'_>, mode: Mode, count: usize, place: &str, sink: &mut Sink<'_>) {
     if mode == Mode::Triangles && !count.is_multiple_of(3) {
-        sink.warn(format!(
-            "{}: {place}: {count} indices are not a multiple of 3; the rest is left out",
-            document.file
-        ));
+        let what = "number of indices is not a multiple of 3; the rest is left out";
+        sink.repaired(document.file, place, what);
     }
 }
 

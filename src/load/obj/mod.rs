@@ -57,9 +57,7 @@ pub(super) fn load(
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
     let done = geometry::finish(assemble::mesh(&raw));
-    for line in done.mended.lines() {
-        sink.warn(format!("{file}: {line}"));
-    }
+    done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
@@ -80,7 +78,7 @@ fn material_entity(
         return all;
     }
     let Some(name) = name else {
-        sink.decide(format!("{file}: surfaces without a material are light grey"));
+        sink.decide(file, "surfaces without a material are light grey");
         return sink.spawn((Name::new("default"), Material::default()));
     };
     if let Some(&known) = library.get(name) {
@@ -92,9 +90,9 @@ fn material_entity(
     let short: String = name.chars().take(80).collect();
     let lower = name.to_lowercase();
     if let Some((other, &entity)) = library.iter().find(|(other, _)| other.to_lowercase() == lower) {
-        sink.warn(format!("{file}: material `{short}` is defined as `{other}`"));
+        sink.repaired(file, "", format!("material `{short}` is defined as `{other}`"));
         return entity;
     }
-    sink.warn(format!("{file}: material `{short}` is not defined; light grey"));
+    sink.repaired(file, "", format!("material `{short}` is not defined; light grey"));
     sink.spawn((Name::new(short), Material::default()))
 }
