@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use values::{exposure, isa, noise, resolution, sample_range, seconds, vector, view_angle};
+use values::{exposure, isa, noise, resolution, sample_range, seconds, time, vector, view_angle};
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
@@ -117,6 +117,9 @@ pub struct SceneArgs {
     /// Settings file to use instead of the .toml beside the scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
+    /// What of a file that holds several scenes, variants or poses.
+    #[command(flatten)]
+    pub part: PartArgs,
     /// Size of the picture
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     pub resolution: Option<UVec2>,
@@ -170,6 +173,35 @@ pub struct SceneArgs {
     pub tone_map: Option<ToneMapArg>,
 }
 
+/// What of a glTF file to load.
+#[derive(Debug, Args)]
+pub struct PartArgs {
+    /// Scene of a glTF file, by name or by number from 0 [default: the file's]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub gltf_scene: Option<String>,
+    /// Material variant of a glTF file, by name or by number from 0
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub variant: Option<String>,
+    /// Pose at this time of the animations, instead of the rest pose
+    #[arg(long, value_name = "SECONDS", value_parser = time)]
+    pub time: Option<f64>,
+    /// Animation to take the pose from, by name or by number from 0 [default: the first, and those of other things]
+    #[arg(long, value_name = "NAME|INDEX", requires = "time")]
+    pub animation: Option<String>,
+}
+
+impl PartArgs {
+    fn load_options(&self, scene_settings: Option<PathBuf>) -> LoadOptions {
+        LoadOptions {
+            scene_settings,
+            scene: self.gltf_scene.clone(),
+            variant: self.variant.clone(),
+            time: self.time,
+            animation: self.animation.clone(),
+        }
+    }
+}
+
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 #[command(
@@ -183,6 +215,9 @@ pub struct CheckArgs {
     /// Settings file to use instead of the .toml beside each scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
+    /// What of files that hold several scenes, variants or poses.
+    #[command(flatten)]
+    pub part: PartArgs,
     /// Print one JSON object a file, each on a line
     #[arg(long)]
     pub json: bool,
@@ -342,7 +377,7 @@ impl SceneArgs {
     /// How to load it.
     #[must_use]
     pub fn load_options(&self) -> LoadOptions {
-        LoadOptions { scene_settings: self.scene_settings.clone() }
+        self.part.load_options(self.scene_settings.clone())
     }
 
     /// How it should look.
@@ -384,7 +419,7 @@ impl CheckArgs {
     /// How to load.
     #[must_use]
     pub fn load_options(&self) -> LoadOptions {
-        LoadOptions { scene_settings: self.scene_settings.clone() }
+        self.part.load_options(self.scene_settings.clone())
     }
 }
 

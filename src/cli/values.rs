@@ -93,3 +93,9 @@ mod tests {
         assert!(sample_range("64..16").is_err() && view_angle("180").is_err() && exposure("nan").is_err());
     }
 }
+
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    let seconds: f64 =
+        text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if (0.0..=1e9).contains(&seconds) { Ok(seconds) } else { Err("must lie within 0 and 1e9".to_owned()) }
+}

@@ -41,6 +41,18 @@ pub enum LoadError {
         /// What the user can do.
         way_out: &'static str,
     },
+    /// The user chose a scene, animation or variant that the file does not have.
+    #[error("{file}: no {kind} \"{wanted}\"; it has {names}")]
+    NotThere {
+        /// The file.
+        file: String,
+        /// Scene, animation or variant.
+        kind: &'static str,
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        names: String,
+    },
     /// The content is damaged or contradicts itself.
     #[error("{file}: {place}: {problem}")]
     Broken {

@@ -27,9 +27,10 @@ pub use error::{LoadError, ReadError};
 pub use report::{Found, Kind, LoadReport, Remark};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
-use crate::scene::Transform;
+use crate::scene::{Playing, Transform, deform, play, propagate_transforms};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
+use bevy_ecs::system::RunSystemOnce;
 use report::Sink;
 use settings::{Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
@@ -91,6 +92,14 @@ impl fmt::Display for SceneSource {
 pub struct LoadOptions {
     /// Sidecar to use instead of the one beside the scene.
     pub scene_settings: Option<PathBuf>,
+    /// Which scene of a glTF file, by name or by number from 0, instead of its default.
+    pub scene: Option<String>,
+    /// Which material variant of a glTF file (`KHR_materials_variants`), by name or by number from 0.
+    pub variant: Option<String>,
+    /// Pose at this many seconds of its animations, instead of the rest pose.
+    pub time: Option<f64>,
+    /// Which animation, by name or by number from 0, instead of the first and those of other things.
+    pub animation: Option<String>,
 }
 
 /// Reads a scene into the world and derives its `GlobalTransform`s.
@@ -98,7 +107,7 @@ pub struct LoadOptions {
 /// # Errors
 /// A [`LoadError`] that names the file and the place in it; then nothing was added to the world.
 pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> Result<LoadReport, LoadError> {
-    let mut sink = Sink::new(world);
+    let mut sink = Sink::new(world, options);
     match load_into(source, options, &mut sink) {
         Ok(()) => Ok(sink.finish(&source.to_string())),
         Err(error) => {
@@ -134,6 +143,7 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     for settings in &settings {
         settings.spawn_lights(sink)?;
     }
+    pose(sink.world);
     for name in materials.unused() {
         sink.ignored(
             &file,
@@ -144,6 +154,16 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     sink.count();
     framing::complete(&file, active, sink);
     Ok(())
+}
+
+/// Brings meshes into the shape that their weights and joints, animated or not, ask for.
+fn pose(world: &mut World) {
+    // None of these systems has a parameter that could be missing.
+    if world.contains_resource::<Playing>() {
+        let _ = world.run_system_once(play);
+    }
+    let _ = world.run_system_once(propagate_transforms);
+    let _ = world.run_system_once(deform);
 }
 
 /// What a file holds.

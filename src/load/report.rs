@@ -1,5 +1,6 @@
 //! What loading found and did, and the one place that spawns.
 
+use super::LoadOptions;
 use super::settings::SidecarRender;
 use crate::scene::{Camera, Instance, Light, Material, Mesh, Texture};
 use bevy_ecs::prelude::*;
@@ -20,6 +21,8 @@ pub struct LoadReport {
     pub remarks: Vec<Remark>,
     /// Cameras by name, in file order; the active one is the resource [`crate::scene::ActiveCamera`].
     pub cameras: Vec<(String, Entity)>,
+    /// Animations by name, in file order.
+    pub animations: Vec<(String, Entity)>,
     /// Triangles of all instances, without those that have a corner that is not finite, before
     /// those without area are dropped.
     pub triangles: usize,
@@ -122,14 +125,15 @@ pub struct Found {
 /// Where the readers write to: the world, the report, and the list of what was spawned.
 pub(super) struct Sink<'w> {
     pub(super) world: &'w mut World,
+    pub(super) options: &'w LoadOptions,
     pub(super) report: LoadReport,
     spawned: Vec<Entity>,
     unsaid: usize,
 }
 
 impl<'w> Sink<'w> {
-    pub(super) fn new(world: &'w mut World) -> Self {
-        Self { world, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
+    pub(super) fn new(world: &'w mut World, options: &'w LoadOptions) -> Self {
+        Self { world, options, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
     }
 
     /// Spawns, so that [`Sink::undo`] can take it back.
@@ -228,7 +232,8 @@ mod tests {
     #[test]
     fn the_same_at_several_places_is_one_remark_with_its_count() {
         let mut world = World::new();
-        let mut sink = Sink::new(&mut world);
+        let options = LoadOptions::default();
+        let mut sink = Sink::new(&mut world, &options);
         for mesh in 0..6 {
             sink.remark(Kind::Repaired, "a.glb", &format!("mesh {mesh}"), "triangles dropped".into(), 3);
         }
@@ -249,7 +254,8 @@ mod tests {
     #[test]
     fn a_flood_of_remarks_is_counted() {
         let mut world = World::new();
-        let mut sink = Sink::new(&mut world);
+        let options = LoadOptions::default();
+        let mut sink = Sink::new(&mut world, &options);
         for i in 0..1000 {
             sink.ignored("a.glb", "", format!("thing {i}"));
         }

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod animation;
+mod builder;
 mod framing;
 mod gltf;
 mod obj;

@@ -197,8 +197,8 @@ fn models_that_are_missing_or_misplaced_are_named() {
 #[test]
 fn settings_may_be_named_by_the_caller() {
     let folder = Folder::new(&[("a.obj", FLOOR.as_bytes()), ("other.toml", b"[render]\nseed = 7\n")]);
-    let options = LoadOptions { scene_settings: Some(folder.0.join("other.toml")) };
+    let options = LoadOptions { scene_settings: Some(folder.0.join("other.toml")), ..LoadOptions::default() };
     assert_eq!(folder.load_with("a.obj", &options).1.unwrap().render.seed, Some(7));
-    let options = LoadOptions { scene_settings: Some(folder.0.join("gone.toml")) };
+    let options = LoadOptions { scene_settings: Some(folder.0.join("gone.toml")), ..LoadOptions::default() };
     assert_says(&folder.load_with("a.obj", &options).1.unwrap_err().to_string(), "gone.toml: no such file");
 }

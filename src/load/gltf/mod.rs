@@ -10,13 +10,14 @@
 //! targets at the default weights; 1 candela is 1/683 W/sr and 1 lux 1/683 W/m².
 
 mod accessor;
+mod animation;
 mod buffer;
 mod container;
+mod deform;
 mod light;
 mod material;
 mod mesh;
 mod node;
-mod skin;
 mod texture;
 mod vertices;
 
@@ -24,7 +25,9 @@ use super::error::LoadError;
 use super::report::Sink;
 use super::settings::Materials;
 use super::source::{Bytes, Folder, without_bom};
+use animation::AnimationJson;
 use bevy_ecs::prelude::*;
+use gltf::json::mesh::Primitive;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
 
@@ -59,10 +62,19 @@ pub(super) fn load(
     let container = container::split(file, &bytes)?;
     let json = without_bom(container.json);
     check_head(file, json, sink)?;
-    let tree: Root = parse(file, json)?;
-    let placements: Placements = parse(file, json)?;
+    let tree = parse_tree(file, json)?;
+    let more: More = parse(file, json)?;
     let buffers = buffer::read_all(&tree, folder, container.binary);
-    let document = Document { file, folder, root: tree, placements: placements.nodes, buffers };
+    let mut document = Document {
+        file,
+        folder,
+        root: tree,
+        placements: more.nodes,
+        animations: more.animations,
+        variant: None,
+        buffers,
+    };
+    document.choose_variant(sink)?;
     document.check_references()?;
     let materials = material::spawn_all(&document, overrides, sink)?;
     node::spawn_scene(&document, root, materials, sink)
@@ -74,6 +86,9 @@ struct Document<'a> {
     folder: &'a Folder,
     root: Root,
     placements: Vec<Placement>,
+    animations: Vec<AnimationJson>,
+    /// Which of `KHR_materials_variants` is worn.
+    variant: Option<u32>,
     buffers: Vec<buffer::Buffer<'a>>,
 }
 
@@ -97,6 +112,51 @@ impl Document<'_> {
         Ok(())
     }
 
+    /// Takes the material variant that the user wants.
+    fn choose_variant(&mut self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+        let extension = self.root.extensions.as_ref().and_then(|e| e.khr_materials_variants.as_ref());
+        let variants = extension.map_or(&[][..], |extension| &extension.variants).iter().zip(0_u32..);
+        let names: Vec<(String, u32)> = variants.map(|(variant, i)| (variant.name.clone(), i)).collect();
+        self.variant = match &sink.options.variant {
+            Some(wanted) => Some(self.chosen(wanted, "variant", &names)?),
+            None => None,
+        };
+        if !names.is_empty() {
+            let all: Vec<&str> = names.iter().map(|(name, _)| name.as_str()).collect();
+            let worn = self.variant.map_or("its default materials", |i| all[i as usize]);
+            sink.decide(self.file, format!("wears {worn} (--variant: {})", all.join(", ")));
+        }
+        Ok(())
+    }
+
+    /// The material of a primitive in the variant that is worn.
+    fn material_of(&self, primitive: &Primitive) -> Option<u32> {
+        let mappings = primitive.extensions.as_ref().and_then(|e| e.khr_materials_variants.as_ref());
+        let mapped = self.variant.zip(mappings).and_then(|(variant, extension)| {
+            extension.mappings.iter().find(|mapping| mapping.variants.contains(&variant))
+        });
+        mapped
+            .map(|mapping| mapping.material)
+            .or_else(|| primitive.material.as_ref().map(|index| index.value() as u32))
+    }
+
+    /// What the user chose by name or number.
+    fn chosen<T: Copy>(
+        &self,
+        wanted: &str,
+        kind: &'static str,
+        list: &[(String, T)],
+    ) -> Result<T, LoadError> {
+        let by_name = list.iter().find(|(name, _)| name == wanted);
+        let by_number = || list.get(wanted.parse::<usize>().ok()?);
+        by_name.or_else(by_number).map(|&(_, value)| value).ok_or_else(|| {
+            let names: Vec<String> =
+                list.iter().enumerate().map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            LoadError::NotThere { file: self.file.to_owned(), kind, wanted: wanted.to_owned(), names }
+        })
+    }
+
     /// The object that `index` names, or an error that says who names it.
     fn at<'l, T>(&self, list: &'l [T], index: &Index<T>, kind: &str, user: &str) -> Result<&'l T, LoadError> {
         list.get(index.value()).ok_or_else(|| {
@@ -105,11 +165,14 @@ impl Document<'_> {
     }
 }
 
-/// Where nodes stand, in double precision: `gltf::json` keeps only single.
+/// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
+/// and animations.
 #[derive(Deserialize)]
-struct Placements {
+struct More {
     #[serde(default)]
     nodes: Vec<Placement>,
+    #[serde(default)]
+    animations: Vec<AnimationJson>,
 }
 
 /// Placement of one node; see the glTF specification, section 3.5.3.
@@ -146,6 +209,17 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
         let place = format!("line {} column {}", error.line(), error.column());
         LoadError::broken(file, place, format!("not valid glTF JSON: {reason}"))
     })
+}
+
+/// The whole tree; once more without animations if it fails, because `gltf::json` knows only those of nodes.
+fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
+    let first = match parse(file, json) {
+        Ok(tree) => return Ok(tree),
+        Err(first) => first,
+    };
+    let mut value: serde_json::Value = parse(file, json)?;
+    let animations = value.as_object_mut().and_then(|root| root.remove("animations"));
+    animations.and_then(|_| serde_json::from_value(value).ok()).ok_or(first)
 }
 
 /// Refuses other versions and required extensions; warns of extensions that are merely used.

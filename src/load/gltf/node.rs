@@ -1,11 +1,12 @@
 //! The node hierarchy: checked, then spawned from the roots down without recursion.
 
+use super::deform::{self, Follower};
 use super::material::Palette;
 use super::mesh::{Built, Meshes};
-use super::{Document, Placement, light, skin};
+use super::{Document, Placement, animation, light};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
-use crate::scene::{Instance, Transform};
+use crate::scene::{Instance, MorphWeights, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
@@ -30,11 +31,6 @@ pub(super) fn spawn_scene(
     let local: Vec<DAffine3> =
         (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
     let order = top_down(document, &roots);
-    let mut world: Vec<Option<DAffine3>> = vec![None; nodes.len()];
-    for &i in &order {
-        let above = parents[i].and_then(|parent| world[parent]).unwrap_or(DAffine3::IDENTITY);
-        world[i] = Some(above * local[i]);
-    }
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
@@ -59,24 +55,33 @@ pub(super) fn spawn_scene(
             sink.world.entity_mut(entity).insert(camera);
             sink.report.cameras.push((name, entity));
         }
-        if let Some(mesh) = &node.mesh {
-            let joints = match &node.skin {
-                Some(index) => Some((index.value(), skin::joints(document, index, &world, &user)?)),
-                None => None,
-            };
-            let posed = joints.as_ref().map(|(skin, joints)| (*skin, joints.as_slice()));
-            let built = meshes.get(document, mesh, posed, &mut palette, &user, sink)?;
-            if posed.is_some() {
-                // The format: the transform of a skinned mesh's own node does not count.
-                let name = Name::new(format!("{user} (skinned)"));
-                let holder = sink.spawn((name, Transform::default(), ChildOf(root)));
-                instantiate(&built, holder, sink);
-            } else {
-                place(document, node, entity, &built, &user, sink)?;
-            }
+    }
+    for &i in &order {
+        let (node, user) = (&nodes[i], format!("node {i}"));
+        let (Some(index), Some(entity)) = (&node.mesh, entities[i]) else { continue };
+        let mesh = document.at(&document.root.meshes, index, "mesh", &user)?;
+        let weights = deform::weights_of(node, mesh);
+        let morphs = weights.iter().any(|&weight| weight != 0.0)
+            || (!weights.is_empty() && !document.animations.is_empty());
+        // The format: the transform of a skinned mesh's own node does not count.
+        let holder = node.skin.as_ref().map(|_| {
+            sink.spawn((Name::new(format!("{user} (skinned)")), Transform::default(), ChildOf(root)))
+        });
+        let skin = match node.skin.as_ref().zip(holder) {
+            Some((index, holder)) => Some(deform::skin(document, index, &entities, holder, &user, sink)?),
+            None => None,
+        };
+        let follower = (morphs || skin.is_some()).then(|| Follower { node: i, weights: entity, skin });
+        if morphs {
+            sink.world.entity_mut(entity).insert(MorphWeights(weights));
+        }
+        let built = meshes.get(document, index, follower, &mut palette, &user, sink)?;
+        match holder {
+            Some(holder) => instantiate(&built, holder, sink),
+            None => place(document, node, entity, &built, &user, sink)?,
         }
     }
-    Ok(())
+    animation::spawn_all(document, &entities, sink)
 }
 
 /// Puts the mesh on its node, or once at each place that `EXT_mesh_gpu_instancing` lists.
@@ -211,13 +216,22 @@ fn scene_roots(
 ) -> Result<Vec<usize>, LoadError> {
     let root = &document.root;
     let file = document.file;
-    let scene = match &root.scene {
-        Some(index) => Some(document.at(&root.scenes, index, "scene", "default scene")?),
-        None => root.scenes.first(),
+    let names = root.scenes.iter().enumerate();
+    let names: Vec<(String, usize)> =
+        names.map(|(i, scene)| (scene.name.clone().unwrap_or_else(|| format!("scene {i}")), i)).collect();
+    let shown = match (&sink.options.scene, &root.scene) {
+        (Some(wanted), _) => document.chosen(wanted, "scene", &names)?,
+        (None, Some(index)) => {
+            document.at(&root.scenes, index, "scene", "default scene")?;
+            index.value()
+        }
+        (None, None) => 0,
     };
-    if root.scenes.len() > 1 {
-        let shown = root.scene.as_ref().map_or(0, Index::value);
-        sink.decide(file, format!("has {} scenes; shows scene {shown}", root.scenes.len()));
+    let scene = root.scenes.get(shown);
+    if names.len() > 1 {
+        let all: Vec<&str> = names.iter().map(|(name, _)| name.as_str()).collect();
+        let what = format!("shows scene {shown} of {} (--gltf-scene: {})", names.len(), all.join(", "));
+        sink.decide(file, what);
     }
     let Some(scene) = scene else {
         if !parents.is_empty() {

@@ -87,7 +87,7 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// The image of a texture: the core one, else that of an extension.
+/// The image of a texture: that of an extension (the core one is for those who cannot read it), else the core one.
 fn source_of(texture: &json::Texture) -> Option<usize> {
     let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
     let extension = |name: &str| {
@@ -95,7 +95,7 @@ fn source_of(texture: &json::Texture) -> Option<usize> {
         u32::try_from(source).ok().map(|source| source as usize)
     };
     let core = Some(texture.source.value()).filter(|&source| source != u32::MAX as usize);
-    core.or_else(|| extension("EXT_texture_webp")).or_else(|| extension("KHR_texture_basisu"))
+    extension("EXT_texture_webp").or(core).or_else(|| extension("KHR_texture_basisu"))
 }
 
 fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image) -> Picture<'d> {

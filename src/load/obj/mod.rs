@@ -56,7 +56,7 @@ pub(super) fn load(
         .iter()
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
-    let done = geometry::finish(assemble::mesh(&raw));
+    let done = geometry::finish(assemble::mesh(&raw), false);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {
