@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use values::{exposure, isa, noise, resolution, sample_range, seconds, time, vector, view_angle};
+use values::{bytes, exposure, isa, noise, resolution, sample_range, seconds, time, vector, view_angle};
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
@@ -188,6 +188,9 @@ pub struct PartArgs {
     /// Animation to take the pose from, by name or by number from 0 [default: the first, and those of other things]
     #[arg(long, value_name = "NAME|INDEX", requires = "time")]
     pub animation: Option<String>,
+    /// Memory that loading may take, such as 2G or 500M [default: three quarters of what is free]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub max_memory: Option<u64>,
 }
 
 impl PartArgs {
@@ -198,6 +201,7 @@ impl PartArgs {
             variant: self.variant.clone(),
             time: self.time,
             animation: self.animation.clone(),
+            max_memory: self.max_memory,
         }
     }
 }

@@ -99,3 +99,18 @@ pub(super) fn time(text: &str) -> Result<f64, String> {
         text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
     if (0.0..=1e9).contains(&seconds) { Ok(seconds) } else { Err("must lie within 0 and 1e9".to_owned()) }
 }
+
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit: u64 =
+        match text[digits.len()..].to_ascii_uppercase().trim_end_matches("IB").trim_end_matches('B') {
+            "" => 1,
+            "K" => 1 << 10,
+            "M" => 1 << 20,
+            "G" => 1 << 30,
+            "T" => 1 << 40,
+            _ => return Err(format!("\"{text}\" is not a size such as 500M or 2G")),
+        };
+    let number: u64 = digits.parse().map_err(|_| format!("\"{text}\" is not a size such as 500M or 2G"))?;
+    number.checked_mul(unit).ok_or_else(|| format!("\"{text}\" is too large"))
+}

@@ -53,6 +53,20 @@ pub enum LoadError {
         /// What there is.
         names: String,
     },
+    /// It would take more memory than loading may.
+    #[error(
+        "{file}: {place}: takes loading to {needed} MiB of memory, more than the {limit} MiB allowed; allow more with --max-memory"
+    )]
+    Memory {
+        /// The file.
+        file: String,
+        /// What of it.
+        place: String,
+        /// MiB that loading would have taken.
+        needed: u64,
+        /// MiB that it may take.
+        limit: u64,
+    },
     /// The content is damaged or contradicts itself.
     #[error("{file}: {place}: {problem}")]
     Broken {

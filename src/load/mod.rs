@@ -9,12 +9,14 @@
 //! No file can make it panic, recurse without bound, open another machine's files, or allocate what
 //! is not there: every count is checked against the bytes that must hold it.
 
+mod budget;
 mod builtin;
 mod card;
 mod error;
 mod framing;
 mod geometry;
 mod gltf;
+mod ktx2;
 mod obj;
 mod picture;
 mod report;
@@ -98,6 +100,8 @@ pub struct LoadOptions {
     pub variant: Option<String>,
     /// Pose at this many seconds of its animations, instead of the rest pose.
     pub time: Option<f64>,
+    /// Bytes of memory that loading may take, instead of three quarters of what the machine has left.
+    pub max_memory: Option<u64>,
     /// Which animation, by name or by number from 0, instead of the first and those of other things.
     pub animation: Option<String>,
 }
@@ -118,7 +122,7 @@ pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> R
 }
 
 fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -> Result<(), LoadError> {
-    let (file, folder, bytes) = open(source)?;
+    let (file, folder, bytes) = open(source, sink)?;
     let format = Format::of(&file, &bytes)?;
     let mut settings = Vec::new();
     if format == Format::Settings {
@@ -187,10 +191,12 @@ impl Format {
     }
 }
 
-fn open(source: &SceneSource) -> Result<(String, Folder, Bytes), LoadError> {
+fn open(source: &SceneSource, sink: &Sink<'_>) -> Result<(String, Folder, Bytes), LoadError> {
     match source {
         SceneSource::File(path) => {
             let file = path.to_string_lossy().into_owned();
+            let length = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+            sink.budget.take(length, &file, "the file itself")?;
             match source::read_file(path, SCENE_LIMIT) {
                 Ok(bytes) => Ok((file, Folder::of(path), bytes)),
                 Err(source) => Err(LoadError::Read { file, source }),

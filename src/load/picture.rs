@@ -1,6 +1,7 @@
 //! Image files → texels. A picture that cannot be had is a warning and a magenta checker, never an error.
 
 use super::error::ReadError;
+use super::ktx2;
 use super::report::{Kind, Sink};
 use crate::scene::Texels;
 use image::error::ImageError;
@@ -12,8 +13,6 @@ use std::sync::Arc;
 
 /// Most texels of one picture: 8192 squared, 256 MiB decoded.
 const MOST_TEXELS: u64 = 1 << 26;
-/// Most texels of all pictures of a file together: 2 GiB decoded.
-const MOST_TEXELS_TOGETHER: u64 = 1 << 29;
 
 /// A picture to decode.
 pub(super) struct Picture<'a> {
@@ -30,14 +29,12 @@ struct Note(Kind, String);
 
 /// Decodes all pictures side by side; `file` is the scene that names them.
 pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Arc<Texels>> {
-    let mut budget = MOST_TEXELS_TOGETHER;
+    // Decoders need as much again for a while.
     let affordable: Vec<bool> = pictures
         .iter()
         .map(|picture| {
             let texels = picture.bytes.as_ref().ok().and_then(|bytes| texel_count(bytes)).unwrap_or(0);
-            let fits = texels <= budget;
-            budget -= if fits { texels } else { 0 };
-            fits
+            sink.budget.take(8 * texels, file, &picture.label).is_ok()
         })
         .collect();
     let decoded: Vec<(Arc<Texels>, Vec<Note>)> = pictures
@@ -47,7 +44,9 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
             let mut remarks = Vec::new();
             let result = match &picture.bytes {
                 Err(why) => Err(format!("image {why}")),
-                Ok(_) if !affordable => Err("image left out: the pictures together are too large".to_owned()),
+                Ok(_) if !affordable => {
+                    Err("image left out: too large for the memory allowed (see --max-memory)".to_owned())
+                }
                 Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
             };
             let texels = result.unwrap_or_else(|why| {
@@ -77,6 +76,9 @@ pub(super) fn stand_in() -> Texels {
 }
 
 fn texel_count(bytes: &[u8]) -> Option<u64> {
+    if let Some([width, height]) = ktx2::size(bytes) {
+        return Some(u64::from(width) * u64::from(height));
+    }
     let (width, height) =
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
@@ -84,6 +86,9 @@ fn texel_count(bytes: &[u8]) -> Option<u64> {
 
 /// Decodes one picture, by its first bytes and not by its name.
 fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels, String> {
+    if ktx2::size(bytes).is_some() {
+        return ktx2::decode(bytes, MOST_TEXELS);
+    }
     if let Some(format) = foreign_format(bytes) {
         return Err(format!("image format {format} is not supported"));
     }
@@ -136,12 +141,8 @@ fn describe(error: &ImageError) -> String {
 
 /// Formats that scenes refer to and that are not decoded.
 fn foreign_format(bytes: &[u8]) -> Option<&'static str> {
-    const MAGIC: [(&[u8], &str); 4] = [
-        (b"\xabKTX 20\xbb", "KTX2 (KHR_texture_basisu)"),
-        (b"\xabKTX 11\xbb", "KTX"),
-        (b"DDS ", "DDS"),
-        (b"sB", "Basis Universal"),
-    ];
+    const MAGIC: [(&[u8], &str); 3] =
+        [(b"\xabKTX 11\xbb", "KTX"), (b"DDS ", "DDS"), (b"sB", "Basis Universal")];
     MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, name)| name)
 }
 

@@ -1,11 +1,13 @@
 //! What loading found and did, and the one place that spawns.
 
 use super::LoadOptions;
+use super::budget::Budget;
 use super::settings::SidecarRender;
 use crate::scene::{Camera, Instance, Light, Material, Mesh, Texture};
 use bevy_ecs::prelude::*;
 use serde::Serialize;
 use std::fmt;
+use std::sync::Arc;
 
 /// More remarks than this are only counted.
 const MOST_REMARKS: usize = 200;
@@ -126,6 +128,7 @@ pub struct Found {
 pub(super) struct Sink<'w> {
     pub(super) world: &'w mut World,
     pub(super) options: &'w LoadOptions,
+    pub(super) budget: Arc<Budget>,
     pub(super) report: LoadReport,
     spawned: Vec<Entity>,
     unsaid: usize,
@@ -133,7 +136,8 @@ pub(super) struct Sink<'w> {
 
 impl<'w> Sink<'w> {
     pub(super) fn new(world: &'w mut World, options: &'w LoadOptions) -> Self {
-        Self { world, options, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
+        let budget = Arc::new(Budget::new(options.max_memory));
+        Self { world, options, budget, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
     }
 
     /// Spawns, so that [`Sink::undo`] can take it back.

@@ -4,6 +4,7 @@
 
 mod animation;
 mod builder;
+mod compressed;
 mod framing;
 mod gltf;
 mod obj;
@@ -130,16 +131,19 @@ fn gltf_triangle(node: &str, primitive: &str, more: &str) -> String {
 
 /// A PNG of one texel of this colour.
 fn png(color: [u8; 4]) -> Vec<u8> {
+    picture(&color, 1, image::ImageFormat::Png)
+}
+
+/// A white PNG of this side.
+fn png_of(side: u32) -> Vec<u8> {
+    picture(&vec![255; (4 * side * side) as usize], side, image::ImageFormat::Png)
+}
+
+/// A square picture of these RGBA bytes.
+fn picture(rgba: &[u8], side: u32, format: image::ImageFormat) -> Vec<u8> {
     let mut bytes = Vec::new();
-    image::write_buffer_with_format(
-        &mut std::io::Cursor::new(&mut bytes),
-        &color,
-        1,
-        1,
-        image::ColorType::Rgba8,
-        image::ImageFormat::Png,
-    )
-    .unwrap();
+    let mut writer = std::io::Cursor::new(&mut bytes);
+    image::write_buffer_with_format(&mut writer, rgba, side, side, image::ColorType::Rgba8, format).unwrap();
     bytes
 }
 

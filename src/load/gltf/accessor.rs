@@ -1,6 +1,7 @@
 //! Checked access to accessors: nothing is read outside its view, nothing allocated from a count.
 
 use super::Document;
+use super::draco::Decoded;
 use crate::load::error::LoadError;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
@@ -39,6 +40,11 @@ impl<'a> Document<'a> {
     ) -> Result<Elements<'d>, LoadError> {
         let accessor = self.at(&self.root.accessors, index, "accessor", user)?;
         let place = format!("accessor {} ({user})", index.value());
+        if let Some(Decoded { bytes, kind, width, count }) = self.decoded.get(&index.value()) {
+            let dense = Some(Dense { bytes, stride: width * kind.size() });
+            let (count, width, kind) = (*count, *width, *kind);
+            return Ok(Elements { place, count, width, kind, normalized: false, dense, sparse: None });
+        }
         let (Checked::Valid(kind), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
             return Err(self.broken(place, "unknown component type or type"));
         };

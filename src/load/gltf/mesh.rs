@@ -152,6 +152,15 @@ fn read_primitive(
             return Err(document.broken(&other.place, problem));
         }
     }
+    let corners = match &primitive.indices {
+        Some(index) => document.elements(index, place)?.count,
+        None => positions.count,
+    };
+    let vertices = positions.count.min(corners) as u64;
+    let triangles = if mode == Mode::Triangles { corners / 3 } else { corners } as u64;
+    // Twice, because primitives are put together; then what building a hierarchy takes.
+    let memory = 4 * positions.count as u64 + 2 * (vertices * 48 + triangles * 14) + triangles * 80;
+    document.budget.take(memory, file, place)?;
     let used = Used::read(document, primitive, positions.count, mode, place, sink)?;
     let vertices = used.vertices.iter().map(|&v| v as usize);
     let mut part = Part {

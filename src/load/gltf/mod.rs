@@ -14,13 +14,16 @@ mod animation;
 mod buffer;
 mod container;
 mod deform;
+mod draco;
 mod light;
 mod material;
 mod mesh;
+mod meshopt;
 mod node;
 mod texture;
 mod vertices;
 
+use super::budget::Budget;
 use super::error::LoadError;
 use super::report::Sink;
 use super::settings::Materials;
@@ -30,11 +33,18 @@ use bevy_ecs::prelude::*;
 use gltf::json::mesh::Primitive;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Extensions that are honoured wholly or closely enough to accept a file that requires them.
-const SUPPORTED: [&str; 15] = [
+const SUPPORTED: &[&str] = &[
+    "EXT_mesh_features",
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_structural_metadata",
     "EXT_texture_webp",
+    "FB_ngon_encoding",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -45,6 +55,9 @@ const SUPPORTED: [&str; 15] = [
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
     "MSFT_lod",
@@ -64,7 +77,7 @@ pub(super) fn load(
     check_head(file, json, sink)?;
     let tree = parse_tree(file, json)?;
     let more: More = parse(file, json)?;
-    let buffers = buffer::read_all(&tree, folder, container.binary);
+    let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
         file,
         folder,
@@ -72,10 +85,15 @@ pub(super) fn load(
         placements: more.nodes,
         animations: more.animations,
         variant: None,
+        unpacked: Vec::new(),
+        decoded: HashMap::new(),
+        budget: Arc::clone(&sink.budget),
         buffers,
     };
     document.choose_variant(sink)?;
     document.check_references()?;
+    document.unpacked = meshopt::decode_all(&document)?;
+    document.decoded = draco::decode_all(&document)?;
     let materials = material::spawn_all(&document, overrides, sink)?;
     node::spawn_scene(&document, root, materials, sink)
 }
@@ -90,6 +108,11 @@ struct Document<'a> {
     /// Which of `KHR_materials_variants` is worn.
     variant: Option<u32>,
     buffers: Vec<buffer::Buffer<'a>>,
+    /// Buffer views that were compressed, by index.
+    unpacked: Vec<Option<Vec<u8>>>,
+    /// Accessors of primitives that were compressed, by index.
+    decoded: HashMap<usize, draco::Decoded>,
+    budget: Arc<Budget>,
 }
 
 impl Document<'_> {
@@ -261,11 +284,7 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
 
 fn way_out(extension: &str) -> &'static str {
     match extension {
-        "KHR_draco_mesh_compression" => "export it again without Draco compression",
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "export it again without meshopt compression (gltfpack without -c)"
-        }
-        "KHR_texture_basisu" => "export it again with PNG or JPEG textures",
+        "EXT_texture_avif" | "MSFT_texture_dds" => "export it again with PNG, JPEG or WebP textures",
         _ => "export it again without that extension",
     }
 }

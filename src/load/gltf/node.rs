@@ -30,7 +30,7 @@ pub(super) fn spawn_scene(
     let roots = scene_roots(document, &parents, sink)?;
     let local: Vec<DAffine3> =
         (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
-    let order = top_down(document, &roots);
+    let order = visible(document, &roots, &parents, sink);
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
@@ -259,6 +259,32 @@ fn scene_roots(
         }
     }
     Ok(roots)
+}
+
+/// Of the nodes below the roots those that show (`KHR_node_visibility`), in the same order.
+fn visible(
+    document: &Document<'_>,
+    roots: &[usize],
+    parents: &[Option<usize>],
+    sink: &mut Sink<'_>,
+) -> Vec<usize> {
+    let is_hidden = |i: usize| {
+        let others = document.root.nodes[i].extensions.as_ref().map(|extensions| &extensions.others);
+        let extension = others.and_then(|others| others.get("KHR_node_visibility"));
+        extension.and_then(|e| e.get("visible")).is_some_and(|visible| visible == false)
+    };
+    let mut order = top_down(document, roots);
+    let mut hidden = vec![false; document.root.nodes.len()];
+    for &i in &order {
+        hidden[i] = is_hidden(i) || parents[i].is_some_and(|parent| hidden[parent]);
+    }
+    let all = order.len();
+    order.retain(|&i| !hidden[i]);
+    if order.len() < all {
+        let what = format!("leaves out {} nodes that are not visible", all - order.len());
+        sink.decide(document.file, what);
+    }
+    order
 }
 
 /// All nodes below the roots, parents before children, in file order.

@@ -45,6 +45,7 @@ pub(super) fn load(
     lines::for_each(&text, |statement| raw.read(file, &statement))?;
     drop(text);
     drop(bytes);
+    sink.budget.take(raw.memory(), file, "its lists and faces")?;
     raw.check(file, sink)?;
     raw.warn(file, sink);
     let library = match overrides.all {

@@ -159,6 +159,14 @@ impl Raw {
         Ok(slot)
     }
 
+    /// Bytes that this and the mesh made of it take, with what building a hierarchy over it does.
+    pub(super) fn memory(&self) -> u64 {
+        let lists = 12 * self.positions.len() + 12 * self.colors.len() + 8 * self.uvs.len();
+        let triangles = self.corners.len() - 2 * self.faces.len();
+        let here = lists + 12 * self.normals.len() + 12 * self.corners.len() + 16 * self.faces.len();
+        (here + 60 * self.corners.len() + (14 + 80) * triangles) as u64
+    }
+
     /// Corners of face `i`.
     pub(super) fn corners_of(&self, i: usize) -> &[Corner] {
         let start = self.faces[i].first_corner as usize;
