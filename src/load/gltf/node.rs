@@ -71,7 +71,7 @@ pub(super) fn spawn_scene(
             Some((index, holder)) => Some(deform::skin(document, index, &entities, holder, &user, sink)?),
             None => None,
         };
-        let follower = (morphs || skin.is_some()).then(|| Follower { node: i, weights: entity, skin });
+        let follower = (morphs || skin.is_some()).then_some(Follower { node: i, weights: entity, skin });
         if morphs {
             sink.world.entity_mut(entity).insert(MorphWeights(weights));
         }
