@@ -84,14 +84,14 @@ fn exit_codes_are_those_of_the_documentation() {
     let folder = fresh("codes");
     std::fs::write(folder.join("broken.glb"), b"glTF but not really").unwrap();
     std::fs::write(folder.join("wrong.toml"), "[[light]]\nkind = \"sphere\"\nradius = -1\n").unwrap();
-    let needs = r#"{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
-        "extensionsUsed":["KHR_draco_mesh_compression"]}"#;
-    std::fs::write(folder.join("draco.gltf"), needs).unwrap();
+    let needs = r#"{"asset":{"version":"2.0"},"extensionsRequired":["MSFT_texture_dds"],
+        "extensionsUsed":["MSFT_texture_dds"]}"#;
+    std::fs::write(folder.join("needs.gltf"), needs).unwrap();
     let small = ["--spp", "1", "--resolution", "4x4"];
     for (arguments, code, words) in [
         (vec!["render", "nothing.glb", "-o", "a.png"], 3, vec!["nothing.glb"]),
         (vec!["render", "broken.glb", "-o", "a.png"], 3, vec!["broken.glb"]),
-        (vec!["render", "draco.gltf", "-o", "a.png"], 3, vec!["draco.gltf", "KHR_draco_mesh_compression"]),
+        (vec!["render", "needs.gltf", "-o", "a.png"], 3, vec!["needs.gltf", "MSFT_texture_dds"]),
         (vec!["render", "cornel", "-o", "a.png"], 3, vec!["cornel", "did you mean", "cornell"]),
         (vec!["nothing.glb"], 3, vec!["nothing.glb"]),
         (

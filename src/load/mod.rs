@@ -26,6 +26,7 @@ mod source;
 pub use builtin::{BuiltIn, built_in_scenes};
 pub use card::{Card, Verdict};
 pub use error::{LoadError, ReadError};
+pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use report::{Found, Kind, LoadReport, Remark};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 

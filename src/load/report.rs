@@ -184,6 +184,11 @@ impl<'w> Sink<'w> {
         }
     }
 
+    /// Remembers what was spawned elsewhere for [`Sink::undo`].
+    pub(super) fn note_spawned(&mut self, entity: Entity) {
+        self.spawned.push(entity);
+    }
+
     /// The program decides what the file does not say.
     pub(super) fn decide(&mut self, file: &str, what: impl Into<String>) {
         self.remark(Kind::Decided, file, "", what.into(), 1);

@@ -8,6 +8,7 @@ mod compressed;
 mod framing;
 mod gltf;
 mod obj;
+mod obj_words;
 mod settings;
 
 use bevy_ecs::name::Name;

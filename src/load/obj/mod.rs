@@ -46,6 +46,7 @@ pub(super) fn load(
     drop(text);
     drop(bytes);
     sink.budget.take(raw.memory(), file, "its lists and faces")?;
+    raw.scale_colors(file, sink);
     raw.check(file, sink)?;
     raw.warn(file, sink);
     let library = match overrides.all {

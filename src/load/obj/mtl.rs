@@ -31,6 +31,8 @@ pub(super) fn spawn_all(
     let mut entities = BTreeMap::new();
     for material in &parsed {
         if entities.contains_key(&material.name) {
+            let what = format!("material `{}` is defined twice; the first counts", material.name);
+            sink.repaired(file, "", what);
             continue;
         }
         let entity = overrides.replacement(&material.name).unwrap_or_else(|| {
@@ -118,8 +120,7 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
             ("map_Kd" | "map_d" | "map_Ke", _) if rest.is_empty() => ignore("without a file name, ignored"),
             ("map_Kd" | "map_d" | "map_Ke", _) => writeln!(tidied, "{keyword} {rest}"),
             (
-                "map_Ka" | "map_Ks" | "map_Ns" | "map_Bump" | "map_bump" | "bump" | "disp" | "decal" | "refl"
-                | "norm",
+                "map_Ks" | "map_Ns" | "map_Bump" | "map_bump" | "bump" | "disp" | "decal" | "refl" | "norm",
                 _,
             ) => {
                 sink.ignored(
@@ -129,7 +130,9 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
                 );
                 Ok(())
             }
-            _ => Ok(()),
+            // The ambient colour of a lighting model without other light.
+            ("map_Ka", _) => Ok(()),
+            _ => ignore("is not supported"),
         }
     });
     // Writing to a String cannot fail.

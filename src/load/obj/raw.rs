@@ -159,6 +159,15 @@ impl Raw {
         Ok(slot)
     }
 
+    /// Some exporters write colours as bytes.
+    pub(super) fn scale_colors(&mut self, file: &str, sink: &mut Sink<'_>) {
+        let most = self.colors.iter().filter(|c| c.is_finite()).map(|c| c.max_element()).fold(0.0, f32::max);
+        if most > 2.0 && most <= 255.0 {
+            self.colors.iter_mut().for_each(|color| *color /= 255.0);
+            sink.decide(file, "vertex colours go beyond 1: read as 0 to 255");
+        }
+    }
+
     /// Bytes that this and the mesh made of it take, with what building a hierarchy over it does.
     pub(super) fn memory(&self) -> u64 {
         let lists = 12 * self.positions.len() + 12 * self.colors.len() + 8 * self.uvs.len();
