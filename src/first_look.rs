@@ -8,7 +8,7 @@ use crate::scene::Light;
 use crate::scene::color::luminance;
 use crate::sync;
 use crate::trace::Film;
-use glam::{UVec2, Vec2};
+use glam::{UVec2, Vec2, Vec3};
 
 /// Size of that picture: always the same, so that the window and `render` agree.
 const PROBE: UVec2 = UVec2::new(96, 64);
@@ -46,26 +46,30 @@ pub(crate) fn settle(app: &mut App, report: &mut LoadReport, file: &str, choose_
     }
 }
 
-/// Whether most of the surfaces that the camera sees are black beside the bright ones.
+/// Whether most of the surfaces that the camera sees, and that do not shine themselves, are black beside the
+/// bright ones.
 fn is_mostly_dark(app: &App, picture: &Film) -> bool {
     let scene = sync::traceable(&app.world);
     let size = picture.size();
-    let mut seen: Vec<f32> = Vec::new();
+    let mut seen: Vec<(f32, bool)> = Vec::new();
     for y in 0..size.y {
         for (x, pixel) in (0..size.x).zip(picture.row(y)) {
             let ray = scene.viewpoint.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size);
-            if scene.geometry.tlas.closest_hit(&ray).is_some() {
-                seen.push(luminance(pixel.mean().as_vec3()));
+            if let Some(hit) = scene.geometry.tlas.closest_hit(&ray) {
+                let shines = scene.surface_at(&hit).1.material.emission != Vec3::ZERO;
+                seen.push((luminance(pixel.mean().as_vec3()), shines));
             }
         }
     }
-    let mut lit: Vec<f32> = seen.iter().copied().filter(|&l| l > 0.0).collect();
+    let mut lit: Vec<f32> = seen.iter().map(|&(l, _)| l).filter(|&l| l > 0.0).collect();
     if lit.is_empty() {
         return !seen.is_empty();
     }
     // Not the very brightest: a lamp in the picture outshines all that it lights.
     let rank = (lit.len() - 1) * 9 / 10;
-    let bright = *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
-    let dark = seen.iter().filter(|&&l| l <= DARK * bright).count();
-    dark as f32 > MOSTLY * seen.len() as f32
+    let least = DARK * *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
+    // Where the texture of an emissive surface is black it is a surface like others.
+    let others = seen.iter().filter(|&&(l, shines)| !shines || l <= least);
+    let dark = others.clone().filter(|&&(l, _)| l <= least).count();
+    dark > 0 && dark as f32 > MOSTLY * others.count() as f32
 }
