@@ -26,6 +26,11 @@ pub(super) fn decode(bytes: &[u8], most_texels: u64) -> Result<Texels, String> {
         let what = "only Basis Universal is read";
         return Err(format!("KTX2 image of Vulkan format {format}: {what}; save it as PNG, JPEG or WebP"));
     }
+    if !levels_are_there(bytes, texels) {
+        return Err(
+            "KTX2 image cannot be decoded (its levels lie outside of the file or are too large)".to_owned()
+        );
+    }
     let damaged = |why: &dyn std::fmt::Debug| format!("KTX2 image cannot be decoded ({why:?})");
     let rgba = Transcoder::new(bytes)
         .and_then(|image| image.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE))
@@ -36,6 +41,24 @@ pub(super) fn decode(bytes: &[u8], most_texels: u64) -> Result<Texels, String> {
     } else {
         Err(damaged(&"wrong number of texels"))
     }
+}
+
+/// Whether all levels are within the file and none unpacks to more than its texels can take: the decoder believes
+/// these numbers.
+fn levels_are_there(bytes: &[u8], texels: u64) -> bool {
+    // A block of 4 x 4 texels has 16 bytes at most; one row and column of blocks may be partly outside.
+    let most = 16 * (texels / 16 + texels + 16);
+    let Some(count) = word(bytes, 40).filter(|&count| count <= 32) else { return false };
+    (0..count.max(1) as usize).all(|level| {
+        let number = |field: usize| {
+            let at = 80 + 24 * level + 8 * field;
+            bytes.get(at..at + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes)
+        };
+        let (Some(offset), Some(length), Some(unpacked)) = (number(0), number(1), number(2)) else {
+            return false;
+        };
+        offset.checked_add(length).is_some_and(|end| end <= bytes.len() as u64) && unpacked <= most
+    })
 }
 
 fn word(bytes: &[u8], at: usize) -> Option<u32> {
