@@ -8,7 +8,7 @@ use penumbra::cli::{
 use penumbra::farm::{self, is_film};
 use penumbra::image::compare::compare_files;
 use penumbra::image::{ImageError, PictureFormat, save};
-use penumbra::load::{Card, LoadReport, Verdict, built_in_scenes};
+use penumbra::load::{Card, LoadError, LoadOptions, LoadReport, Phase, Verdict, Watcher, built_in_scenes};
 use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use penumbra::report::{Report, ReportError, measure_all, write};
@@ -161,9 +161,10 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
     set_threads(scene.threads);
     let interrupt = Arc::new(AtomicBool::new(false));
     stop_on_signals(&interrupt);
+    let bar = Bar::new(output.quiet);
     let job = RenderJob {
         source,
-        load: scene.load_options(),
+        load: LoadOptions { watcher: bar.watcher(), ..scene.load_options() },
         wishes: scene.wishes(output),
         time_limit: output.time_limit,
         noise: output.noise,
@@ -173,7 +174,6 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
         outputs,
         interrupt,
     };
-    let bar = Bar::new(output.quiet);
     let say = |report: &LoadReport| {
         if !output.quiet {
             tell(report);
@@ -183,6 +183,10 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
     bar.clear();
     match result {
         Ok(summary) => finish(&summary, output),
+        Err(RenderError::Open(OpenError::Load(error @ LoadError::NotThere { .. }))) => {
+            eprintln!("error: {error}");
+            exit::BAD_COMMAND_LINE
+        }
         Err(RenderError::Open(OpenError::Load(error))) => {
             eprintln!("error: {error}");
             exit::SCENE_NOT_READABLE
@@ -290,6 +294,25 @@ impl Bar {
             ProgressBar::new(1000).with_style(style)
         });
         Self { bar, last_line: std::cell::Cell::new(Some(Instant::now())), quiet }
+    }
+
+    /// Shows how far loading is.
+    fn watcher(&self) -> Watcher {
+        let Some(bar) = self.bar.clone() else { return Watcher::default() };
+        Watcher(Some(Arc::new(move |phase, part| {
+            // Where each phase begins, as large files go.
+            let (start, end) = match phase {
+                Phase::Reading => (0.0, 0.1),
+                Phase::Parsing => (0.1, 0.4),
+                Phase::Decompressing => (0.4, 0.5),
+                Phase::Images => (0.5, 0.8),
+                Phase::Meshes => (0.8, 0.95),
+                Phase::Framing => (0.95, 1.0),
+            };
+            let part: f32 = start + (end - start) * part;
+            bar.set_position((part * 1000.0) as u64);
+            bar.set_message(format!("loading: {phase}"));
+        })))
     }
 
     fn update(&self, progress: &Progress) {

@@ -202,6 +202,7 @@ impl PartArgs {
             time: self.time,
             animation: self.animation.clone(),
             max_memory: self.max_memory,
+            ..LoadOptions::default()
         }
     }
 }

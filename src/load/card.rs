@@ -1,6 +1,6 @@
 //! The report card of a file: what was found, mended, left out, approximated, decided; or why it is refused.
 
-use super::report::{Found, Kind, LoadReport, Remark};
+use super::report::{Found, Kind, LoadReport, Phase, Remark};
 use super::{LoadError, LoadOptions, SceneSource, load};
 use bevy_ecs::world::World;
 use serde::Serialize;
@@ -31,6 +31,8 @@ pub struct Card {
     pub triangles: usize,
     /// What is in it.
     pub found: Found,
+    /// Seconds of each phase of loading.
+    pub seconds: Vec<(Phase, f64)>,
     /// What was damaged and mended.
     pub repaired: Vec<Remark>,
     /// What was left out.
@@ -68,6 +70,7 @@ impl Card {
             error: loaded.as_ref().err().map(ToString::to_string),
             triangles: report.map_or(0, |report| report.triangles),
             found: report.map_or_else(Found::default, |report| report.found.clone()),
+            seconds: report.map_or_else(Vec::new, |report| report.seconds.clone()),
             repaired,
             ignored,
             approximated,
@@ -93,6 +96,9 @@ impl Card {
             line("format", format);
         }
         line("found", &self.found.text(self.triangles));
+        let times: Vec<String> =
+            self.seconds.iter().map(|(phase, seconds)| format!("{phase} {seconds:.3} s")).collect();
+        line("time", &times.join(", "));
         let kinds = [
             ("repaired", &self.repaired),
             ("ignored", &self.ignored),
@@ -101,7 +107,9 @@ impl Card {
         ];
         for (head, remarks) in kinds {
             for remark in remarks {
-                line(head, &remark.to_string());
+                // The card is headed by the file's name.
+                let said = remark.to_string();
+                line(head, said.strip_prefix(&format!("{}: ", self.file)).unwrap_or(&said));
             }
         }
         text

@@ -27,7 +27,7 @@ pub use builtin::{BuiltIn, built_in_scenes};
 pub use card::{Card, Verdict};
 pub use error::{LoadError, ReadError};
 pub(crate) use framing::{ADDED_LIGHT, light_for};
-pub use report::{Found, Kind, LoadReport, Remark};
+pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
 use crate::scene::{Playing, Transform, deform, play, propagate_transforms};
@@ -103,6 +103,8 @@ pub struct LoadOptions {
     pub time: Option<f64>,
     /// Bytes of memory that loading may take, instead of three quarters of what the machine has left.
     pub max_memory: Option<u64>,
+    /// Who is told how far it is.
+    pub watcher: Watcher,
     /// Which animation, by name or by number from 0, instead of the first and those of other things.
     pub animation: Option<String>,
 }
@@ -148,6 +150,7 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     for settings in &settings {
         settings.spawn_lights(sink)?;
     }
+    sink.begin(Phase::Framing);
     pose(sink.world);
     for name in materials.unused() {
         sink.ignored(

@@ -2,7 +2,7 @@
 
 use super::error::ReadError;
 use super::ktx2;
-use super::report::{Kind, Sink};
+use super::report::{Kind, Phase, Sink};
 use crate::scene::Texels;
 use image::error::ImageError;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Most texels of one picture: 8192 squared, 256 MiB decoded.
 const MOST_TEXELS: u64 = 1 << 26;
@@ -37,10 +38,14 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
             sink.budget.take(8 * texels, file, &picture.label).is_ok()
         })
         .collect();
+    let done = AtomicUsize::new(0);
+    let watcher = &sink.options.watcher;
     let decoded: Vec<(Arc<Texels>, Vec<Note>)> = pictures
         .par_iter()
         .zip(affordable)
         .map(|(picture, affordable)| {
+            let part = done.fetch_add(1, Ordering::Relaxed) as f32 / pictures.len() as f32;
+            watcher.tell(Phase::Images, part);
             let mut remarks = Vec::new();
             let result = match &picture.bytes {
                 Err(why) => Err(format!("image {why}")),

@@ -8,6 +8,7 @@ use bevy_ecs::prelude::*;
 use serde::Serialize;
 use std::fmt;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// More remarks than this are only counted.
 const MOST_REMARKS: usize = 200;
@@ -28,6 +29,8 @@ pub struct LoadReport {
     /// Triangles of all instances, without those that have a corner that is not finite, before
     /// those without area are dropped.
     pub triangles: usize,
+    /// Seconds of each phase, in order: reading, parsing, decompressing, images, meshes, framing.
+    pub seconds: Vec<(Phase, f64)>,
     /// What the settings file says about rendering.
     pub render: SidecarRender,
 }
@@ -54,6 +57,55 @@ impl LoadReport {
     #[must_use]
     pub fn decisions(&self) -> Vec<String> {
         self.of(Kind::Decided).map(ToString::to_string).collect()
+    }
+}
+
+/// A part of loading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Phase {
+    /// The scene's file and buffers.
+    Reading,
+    /// Bytes → statements or JSON.
+    Parsing,
+    /// Decompressing geometry.
+    Decompressing,
+    /// Reading and decoding images.
+    Images,
+    /// Putting meshes together.
+    Meshes,
+    /// Poses, camera, light.
+    Framing,
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Reading => "reading",
+            Self::Parsing => "parsing",
+            Self::Decompressing => "decompressing",
+            Self::Images => "images",
+            Self::Meshes => "meshes",
+            Self::Framing => "framing",
+        })
+    }
+}
+
+/// Who is told what loading is doing: the phase, and how much of it is done, in 0..=1. From any thread.
+#[derive(Clone, Default)]
+pub struct Watcher(pub Option<Arc<dyn Fn(Phase, f32) + Send + Sync>>);
+
+impl Watcher {
+    pub(super) fn tell(&self, phase: Phase, part: f32) {
+        if let Some(tell) = &self.0 {
+            tell(phase, part);
+        }
+    }
+}
+
+impl fmt::Debug for Watcher {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "Watcher(..)" } else { "Watcher(nobody)" })
     }
 }
 
@@ -132,12 +184,32 @@ pub(super) struct Sink<'w> {
     pub(super) report: LoadReport,
     spawned: Vec<Entity>,
     unsaid: usize,
+    phase: (Phase, Instant),
 }
 
 impl<'w> Sink<'w> {
     pub(super) fn new(world: &'w mut World, options: &'w LoadOptions) -> Self {
         let budget = Arc::new(Budget::new(options.max_memory));
-        Self { world, options, budget, report: LoadReport::default(), spawned: Vec::new(), unsaid: 0 }
+        Self {
+            world,
+            options,
+            budget,
+            report: LoadReport::default(),
+            spawned: Vec::new(),
+            unsaid: 0,
+            phase: (Phase::Reading, Instant::now()),
+        }
+    }
+
+    /// Begins the next phase; a phase may come several times.
+    pub(super) fn begin(&mut self, phase: Phase) {
+        let (last, since) = std::mem::replace(&mut self.phase, (phase, Instant::now()));
+        let seconds = since.elapsed().as_secs_f64();
+        match self.report.seconds.iter_mut().find(|(known, _)| *known == last) {
+            Some((_, sum)) => *sum += seconds,
+            None => self.report.seconds.push((last, seconds)),
+        }
+        self.options.watcher.tell(phase, 0.0);
     }
 
     /// Spawns, so that [`Sink::undo`] can take it back.
@@ -227,6 +299,7 @@ impl<'w> Sink<'w> {
 
     /// The finished report.
     pub(super) fn finish(mut self, file: &str) -> LoadReport {
+        self.begin(Phase::Framing);
         if self.unsaid > 0 {
             self.report.add(Kind::Ignored, file, format!("... and {} more remarks", self.unsaid));
         }

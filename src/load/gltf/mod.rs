@@ -25,7 +25,7 @@ mod vertices;
 
 use super::budget::Budget;
 use super::error::LoadError;
-use super::report::Sink;
+use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder, without_bom};
 use animation::AnimationJson;
@@ -72,11 +72,13 @@ pub(super) fn load(
     overrides: &mut Materials,
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
+    sink.begin(Phase::Parsing);
     let container = container::split(file, &bytes)?;
     let json = without_bom(container.json);
     check_head(file, json, sink)?;
     let tree = parse_tree(file, json)?;
     let more: More = parse(file, json)?;
+    sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
         file,
@@ -92,9 +94,12 @@ pub(super) fn load(
     };
     document.choose_variant(sink)?;
     document.check_references()?;
+    sink.begin(Phase::Decompressing);
     document.unpacked = meshopt::decode_all(&document)?;
     document.decoded = draco::decode_all(&document)?;
+    sink.begin(Phase::Images);
     let materials = material::spawn_all(&document, overrides, sink)?;
+    sink.begin(Phase::Meshes);
     node::spawn_scene(&document, root, materials, sink)
 }
 

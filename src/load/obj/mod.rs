@@ -21,7 +21,7 @@ mod raw;
 
 use super::error::LoadError;
 use super::geometry;
-use super::report::Sink;
+use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
 use crate::scene::{Instance, Material, Mesh};
@@ -40,6 +40,7 @@ pub(super) fn load(
     overrides: &mut Materials,
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
+    sink.begin(Phase::Parsing);
     let text = lines::text_of(file, &bytes)?;
     let mut raw = Raw::default();
     lines::for_each(&text, |statement| raw.read(file, &statement))?;
@@ -49,6 +50,7 @@ pub(super) fn load(
     raw.scale_colors(file, sink);
     raw.check(file, sink)?;
     raw.warn(file, sink);
+    sink.begin(Phase::Images);
     let library = match overrides.all {
         Some(_) => BTreeMap::new(),
         None => mtl::spawn_all(file, folder, &raw.libraries, overrides, sink),
@@ -58,6 +60,7 @@ pub(super) fn load(
         .iter()
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
+    sink.begin(Phase::Meshes);
     let done = geometry::finish(assemble::mesh(&raw), false);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
