@@ -179,7 +179,8 @@ fn outline(corners: &[DVec3], axis: usize, mut report: impl FnMut(DVec3)) {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut flat: Vec<_> = corners.iter().map(|p| (p[i], p[j])).collect();
     flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let turn = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0);
+    let turn =
+        |a: (f64, f64), b: (f64, f64), c: (f64, f64)| (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0);
     // The lower chain, then the upper one (A. M. Andrew, 1979).
     for _ in 0..2 {
         let mut chain: Vec<(f64, f64)> = Vec::with_capacity(flat.len());

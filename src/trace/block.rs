@@ -208,7 +208,8 @@ impl Job for SampleQuad<'_> {
             let facing = if height > 0.0 { quad.normal } else { -quad.normal };
             let slope = normal.dot(d);
             let lit = (height > 0.0) | (two_sided & (height < 0.0));
-            let lit = lit & (slope > 0.0) & (block.geometric_normal.get(i).dot(d) > 0.0) & (place.density > 0.0);
+            let lit =
+                lit & (slope > 0.0) & (block.geometric_normal.get(i).dot(d) > 0.0) & (place.density > 0.0);
             let height = height.abs();
             let irradiance = (slope / distance2) * (height / distance2) * (quad.area / place.density);
             // The power heuristic: density of the bounce over that of this sample.

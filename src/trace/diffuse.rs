@@ -5,8 +5,8 @@
 use super::block::{Arrivals, Block, Depart, Departures, IntegrateQuad, LANES, SampleQuad};
 use super::film::Tile;
 use super::integrator::{
-    Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, PICK, Path, ROULETTE_DEPTH, Shadow, mesh_emission,
-    power_heuristic,
+    Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, PICK, Path, ROULETTE_DEPTH, Shadow,
+    mesh_emission, power_heuristic,
 };
 use super::light::FlatLight;
 use super::quad::Quad;

@@ -321,7 +321,8 @@ impl Film {
         self.even_samples = self.complete_samples();
         let across = self.size.x as usize;
         for tile in &mut self.tiles {
-            let [x, y, width, height] = [tile.origin.x, tile.origin.y, tile.size.x, tile.size.y].map(|n| n as usize);
+            let [x, y, width, height] =
+                [tile.origin.x, tile.origin.y, tile.size.x, tile.size.y].map(|n| n as usize);
             tile.shares.clear();
             tile.shares.extend((y..y + height).flat_map(|y| &shares[y * across + x..][..width]));
             tile.more.clear();

@@ -117,7 +117,8 @@ impl Batch {
             Work::Even { until } => {
                 let first = tile.next_sample;
                 let count = until.saturating_sub(first).min((TOGETHER / pixels).max(1));
-                self.keys.extend((0..pixels).flat_map(|i| (first..first + count).map(move |sample| (i, sample))));
+                self.keys
+                    .extend((0..pixels).flat_map(|i| (first..first + count).map(move |sample| (i, sample))));
             }
             Work::Shares { beyond } => {
                 for (i, &more) in (0..pixels).zip(&tile.more) {

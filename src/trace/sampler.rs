@@ -80,7 +80,9 @@ impl Sampler {
                 let index = owen_scramble(self.index, seed);
                 (index.reverse_bits().wrapping_add(x_seed), sobol_1(index).wrapping_add(y_seed))
             }
-            Sampling::Independent | Sampling::Sobol => (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index))),
+            Sampling::Independent | Sampling::Sobol => {
+                (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index)))
+            }
             Sampling::Stratified => {
                 let cell = shuffle_16(self.index & 15, hash(seed ^ hash(self.index >> 4)));
                 let within = |seed| hash(seed ^ hash(self.index)) >> 2;
@@ -254,7 +256,8 @@ mod tests {
 
     #[test]
     fn a_tile_has_the_samplers_of_its_pixels() {
-        let settings = RenderSettings { seed: 7, sampling: Sampling::Stratified, ..RenderSettings::default() };
+        let settings =
+            RenderSettings { seed: 7, sampling: Sampling::Stratified, ..RenderSettings::default() };
         let (origin, size) = (UVec2::new(16, 8), UVec2::new(5, 3));
         let mut all = Vec::new();
         Sampler::tile(origin, size, &settings, |halves| all.push(halves));

@@ -86,7 +86,8 @@ impl Window {
             *corner = origin + direction * t;
         }
         let across = (patch[2] - patch[0]).cross(patch[3] - patch[1]);
-        let toward_eye = if normal.dot(self.corners[0].direction.as_dvec3()) > 0.0 { -normal } else { normal };
+        let toward_eye =
+            if normal.dot(self.corners[0].direction.as_dvec3()) > 0.0 { -normal } else { normal };
         (normal.length_squared() >= 0.25 * across.length_squared()).then_some((patch, toward_eye))
     }
 }
@@ -127,7 +128,13 @@ impl Sightlines {
         Some(&self.blockers[first as usize..end as usize])
     }
 
-    fn look(&mut self, scene: &TraceScene, patch: &[DVec3; 4], normal: DVec3, light: u32) -> Option<(u32, u32)> {
+    fn look(
+        &mut self,
+        scene: &TraceScene,
+        patch: &[DVec3; 4],
+        normal: DVec3,
+        light: u32,
+    ) -> Option<(u32, u32)> {
         let FlatLight::Shape(shape) = scene.lights.get(light) else { return None };
         let Shape::Parallelogram(quad) = &shape.shape else { return None };
         let first = self.blockers.len();

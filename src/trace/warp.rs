@@ -28,7 +28,8 @@ pub fn on_circle(turn: f32) -> (f32, f32) {
     let quarters = quarter(0.125) + quarter(0.375) + quarter(0.625) + quarter(0.875);
     let a = (turn - 0.25 * quarters) * (2.0 * PI);
     let a2 = a * a;
-    let sin = a * (1.0 + a2 * (-1.0 / 6.0 + a2 * (1.0 / 120.0 + a2 * (-1.0 / 5040.0 + a2 * (1.0 / 362_880.0)))));
+    let sin =
+        a * (1.0 + a2 * (-1.0 / 6.0 + a2 * (1.0 / 120.0 + a2 * (-1.0 / 5040.0 + a2 * (1.0 / 362_880.0)))));
     let cos = 1.0 + a2 * (-0.5 + a2 * (1.0 / 24.0 + a2 * (-1.0 / 720.0 + a2 * (1.0 / 40_320.0))));
     let odd = (quarters == 1.0) | (quarters == 3.0);
     let (x, y) = if odd { (sin, cos) } else { (cos, sin) };
@@ -106,7 +107,13 @@ mod tests {
     fn outward_is_the_neighbour_on_that_side() {
         for p in [0.0, -0.0, 1.0, -1.0, 3.5e-45, -1e-45, f32::MAX, f32::INFINITY, 1e-38, -2.5] {
             for n in [1.0, -1.0, 0.0, -0.0, 1e-30, -3.0_f32] {
-                let expected = if n > 0.0 { p.next_up() } else if n < 0.0 { p.next_down() } else { p };
+                let expected = if n > 0.0 {
+                    p.next_up()
+                } else if n < 0.0 {
+                    p.next_down()
+                } else {
+                    p
+                };
                 // A ray never starts at infinity: either answer does.
                 if p.is_finite() {
                     assert_eq!(outward(p, n).to_bits(), expected.to_bits(), "{p:e} toward {n}");
