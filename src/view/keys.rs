@@ -1,0 +1,77 @@
+//! The keyboard: which keys are down, and what a press does at once.
+
+use super::input::Command;
+use super::keymap::{self, Action, Hold, Tap};
+use super::window::Viewer;
+use std::time::Instant;
+use winit::event::{ElementState, KeyEvent};
+use winit::event_loop::ActiveEventLoop;
+use winit::keyboard::PhysicalKey;
+
+impl Viewer {
+    pub(super) fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent, is_synthetic: bool) {
+        let PhysicalKey::Code(code) = event.physical_key else {
+            return;
+        };
+        let control = self.held[Hold::Control as usize];
+        if event.state == ElementState::Released {
+            self.keys.remove(&code);
+            return self.hold();
+        }
+        let Some(binding) = keymap::lookup(code, control) else {
+            return;
+        };
+        match binding.action {
+            // Keys that are down when the window gets the focus were meant for somebody else.
+            action if is_synthetic && !keymap::is_modifier(action) => {}
+            Action::Hold(_) => {
+                self.keys.insert(code);
+                self.hold();
+            }
+            Action::Tap(_) if event.repeat && !binding.repeats => {}
+            Action::Tap(tap) => self.tap(event_loop, tap),
+        }
+    }
+
+    /// Tells the engine what is held, if that is something else than before.
+    pub(super) fn hold(&mut self) {
+        let mut held = [false; Hold::COUNT];
+        for code in &self.keys {
+            if let Some(Action::Hold(hold)) = keymap::lookup(*code, false).map(|b| b.action) {
+                held[hold as usize] = true;
+            }
+        }
+        if held != self.held {
+            self.held = held;
+            self.send(Command::Held { held, at: Instant::now() });
+        }
+    }
+
+    pub(super) fn tap(&mut self, event_loop: &ActiveEventLoop, tap: Tap) {
+        match tap {
+            Tap::HudLevel => self.level = self.level.next(),
+            Tap::Help => self.help = !self.help,
+            Tap::Escape => self.help = false,
+            Tap::Quit => event_loop.exit(),
+            Tap::FullScreen => {
+                if let Some(screen) = &self.screen {
+                    screen.toggle_full_screen();
+                }
+            }
+            Tap::Screenshot | Tap::ScreenshotWithHud => {
+                self.save_screenshot(tap == Tap::ScreenshotWithHud);
+            }
+            tap => {
+                let shift = self.held[Hold::Fast as usize];
+                return self.send(Command::Tap { tap, shift, at: Instant::now() });
+            }
+        }
+        self.redraw();
+    }
+
+    pub(super) fn leave(&mut self) {
+        self.keys.clear();
+        self.hold();
+        self.set_drag(false);
+    }
+}
