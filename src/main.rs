@@ -69,11 +69,19 @@ fn window(args: &WindowArgs) -> u8 {
         }
     };
     set_threads(args.scene.threads);
+    let keys = match penumbra::view::keys_file::read(args.keys.as_deref()) {
+        Ok(keys) => keys,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::BAD_COMMAND_LINE;
+        }
+    };
     let (wishes, even) = (args.scene.wishes(&args.output), args.scene.even);
     let options = ViewOptions {
         title: format!("Penumbra – {}", source.name()),
         size: wishes.size.unwrap_or(RenderSettings::default().size),
         screenshot_stem: source.name(),
+        keys,
         exit_after: None,
     };
     let load = args.scene.load_options();

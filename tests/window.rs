@@ -105,6 +105,7 @@ impl Desktop {
         command
             .env("DISPLAY", &self.display)
             .env("XDG_RUNTIME_DIR", &self.directory)
+            .env("XDG_CONFIG_HOME", &self.directory)
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("WAYLAND_SOCKET")
             .current_dir(&self.directory)
@@ -123,13 +124,22 @@ impl Desktop {
     }
 
     fn start_with(&self, arguments: &[&str], environment: &[(&str, &str)]) -> Program {
-        let child = self
-            .command(env!("CARGO_BIN_EXE_penumbra"))
-            .args(arguments)
-            .envs(environment.iter().copied())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
+        self.start_command(
+            self.command(env!("CARGO_BIN_EXE_penumbra"))
+                .args(arguments)
+                .envs(environment.iter().copied())
+                .stdout(Stdio::null()),
+        )
+    }
+
+    /// What it says on standard output goes to `file`.
+    fn start_saying(&self, arguments: &[&str], file: &Path) -> Program {
+        let said = std::fs::File::create(file).unwrap();
+        self.start_command(self.command(env!("CARGO_BIN_EXE_penumbra")).args(arguments).stdout(said))
+    }
+
+    fn start_command(&self, command: &mut Command) -> Program {
+        let child = command.spawn().unwrap();
         let mut program = Program { child, window: String::new() };
         program.window = wait_for("the window", || {
             assert!(program.child.try_wait().unwrap().is_none(), "the program ended at once");
@@ -465,4 +475,78 @@ fn a_wrong_wayland_display_falls_back_to_x11() {
     };
     let mut program = desktop.start_with(SMALL, &[("WAYLAND_DISPLAY", "wayland-nowhere")]);
     desktop.wait_until_done(&mut program);
+}
+
+#[test]
+fn keys_of_the_users_own_fly_and_a_bad_file_is_one_line() {
+    let Some(desktop) = desktop("keys") else {
+        return;
+    };
+    let file = desktop.directory.join("keys.toml");
+    std::fs::write(&file, "forward = 'J'\nquit = ['Ctrl+J']\n").unwrap();
+    let keys = ["--keys", file.to_str().unwrap()];
+    let mut program = desktop.start(&[SMALL, &keys].concat());
+    desktop.hide_status(&mut program);
+    let before = desktop.shot(&program);
+    for (key, moves) in [("w", false), ("j", true)] {
+        desktop.xdotool(["keydown", key]);
+        pause(300);
+        desktop.xdotool(["keyup", key]);
+        pause(100);
+        desktop.wait_until_done(&mut program);
+        assert_eq!(difference(&before, &desktop.shot(&program)) > 0.05, moves, "{key}");
+    }
+    desktop.xdotool(["key", "ctrl+j"]);
+    assert_eq!(program.wait().code(), Some(0));
+
+    std::fs::write(&file, "forwrd = 'J'\n").unwrap();
+    let output = desktop.command(env!("CARGO_BIN_EXE_penumbra")).args(keys).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(
+        said.contains("keys.toml: line 1: nothing is called \"forwrd\"; did you mean \"forward\"?"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_camera_that_is_copied_renders_what_the_window_shows() {
+    let Some(desktop) = desktop("flags") else {
+        return;
+    };
+    let said = desktop.directory.join("said.txt");
+    let mut program = desktop.start_saying(SMALL, &said);
+    desktop.hide_status(&mut program);
+    // Whole scene, a quarter to the right, parallel, a wide lens, a bit nearer by keys alone.
+    for key in ["Home", "3", "5", "0", "0", "0", "0"] {
+        desktop.xdotool(["key", key]);
+        pause(100);
+    }
+    desktop.xdotool(["keydown", "Left"]);
+    pause(200);
+    desktop.xdotool(["keyup", "Left"]);
+    pause(100);
+    desktop.xdotool(["key", "c"]);
+    // The notice goes.
+    pause(7000);
+    desktop.wait_until_done(&mut program);
+    let shown = desktop.shot(&program);
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+    let flags = std::fs::read_to_string(&said).unwrap();
+    assert!(flags.contains("--camera-orthographic") && flags.contains("--lens-radius"), "{flags}");
+    let rendered = desktop.directory.join("headless.png");
+    let status = desktop
+        .command(env!("CARGO_BIN_EXE_penumbra"))
+        .arg("render")
+        .args(SMALL)
+        .args(flags.split_whitespace())
+        .arg("-o")
+        .arg(&rendered)
+        .status();
+    assert!(status.unwrap().success());
+    let rendered = image::open(rendered).unwrap().to_rgb8();
+    assert!(colors(&rendered) > 50, "nothing is seen");
+    assert_eq!(difference(&rendered, &shown), 0.0);
 }

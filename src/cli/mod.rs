@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use values::{exposure, isa, noise, resolution, sample_range, seconds, vector, view_angle};
+use values::{exposure, isa, length, noise, radius, resolution, sample_range, seconds, vector, view_angle};
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
@@ -60,6 +60,9 @@ pub struct WindowArgs {
     /// Name the built-in scenes
     #[arg(long)]
     pub list_scenes: bool,
+    /// Keys of your own [default: penumbra/keys.toml in your folder of settings, such as ~/.config]
+    #[arg(long, value_name = "FILE.toml")]
+    pub keys: Option<PathBuf>,
 }
 
 /// Arguments of `render`.
@@ -160,6 +163,15 @@ pub struct SceneArgs {
     /// Vertical field of view in degrees
     #[arg(long, value_name = "DEG", value_parser = view_angle)]
     pub camera_view_angle: Option<f32>,
+    /// Look in parallel, with this height of the picture in scene units
+    #[arg(long, value_name = "HEIGHT", value_parser = length, conflicts_with = "camera_view_angle")]
+    pub camera_orthographic: Option<f32>,
+    /// Radius of the lens in scene units: what is not in focus is blurred; 0 for none
+    #[arg(long, value_name = "R", value_parser = radius)]
+    pub lens_radius: Option<f32>,
+    /// Distance of what is sharp along the line of sight [default: that of the focal point]
+    #[arg(long, value_name = "D", value_parser = length)]
+    pub focus_distance: Option<f32>,
     /// Exposure in stops
     #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true)]
     pub exposure: Option<f32>,
@@ -355,6 +367,9 @@ impl SceneArgs {
                 focal_point: self.camera_focal_point,
                 view_up: self.camera_view_up,
                 view_angle: self.camera_view_angle,
+                orthographic: self.camera_orthographic,
+                lens_radius: self.lens_radius,
+                focus_distance: self.focus_distance,
             },
         }
     }

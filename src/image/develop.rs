@@ -53,10 +53,26 @@ impl ToneMap {
 
 /// An exposure for a picture that is much too dark or too bright at 0 EV; `None` if it is all black.
 ///
-/// The 90th percentile of the luminance of what is not black goes to 0.7, in thirds of a stop, if it
-/// lies outside of 0.03 to 3: a picture that is roughly right stays as its author made it.
+/// As [`exposure_for`], if what that goes by lies outside of 0.03 to 3: a picture that is roughly right stays
+/// as its author made it.
 #[must_use]
 pub fn suggest_exposure(film: &Film) -> Option<f32> {
+    let bright = bright(film)?;
+    Some(if (0.03..=3.0).contains(&bright) { 0.0 } else { exposing(bright) })
+}
+
+/// The exposure that brings the 90th percentile of the luminance of what is not black to 0.7, in thirds of
+/// a stop; `None` if all is black.
+#[must_use]
+pub fn exposure_for(film: &Film) -> Option<f32> {
+    bright(film).map(exposing)
+}
+
+fn exposing(bright: f32) -> f32 {
+    ((0.7 / bright).log2() * 3.0).round() / 3.0
+}
+
+fn bright(film: &Film) -> Option<f32> {
     let mut lit: Vec<f32> = (0..film.size().y)
         .flat_map(|y| film.row(y))
         .map(|pixel| luminance(pixel.mean().as_vec3()))
@@ -66,9 +82,7 @@ pub fn suggest_exposure(film: &Film) -> Option<f32> {
         return None;
     }
     let rank = (lit.len() - 1) * 9 / 10;
-    let bright = *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
-    let stops = (0.7 / bright).log2();
-    Some(if (0.03..=3.0).contains(&bright) { 0.0 } else { (stops * 3.0).round() / 3.0 })
+    Some(*lit.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 /// The film as sRGB bytes, RGBA, rows from the top.

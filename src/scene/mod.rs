@@ -13,7 +13,7 @@ pub mod texture;
 pub mod transform;
 
 pub use bounds::SceneBounds;
-pub use camera::{ActiveCamera, Camera, Projection};
+pub use camera::{ActiveCamera, Camera, Lens, Projection};
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, TextureUse};
 pub use mesh::{Instance, Mesh, TriangleMesh};

@@ -65,8 +65,10 @@ pub struct Batch {
     keys: Vec<(u32, u32)>,
 }
 
-/// Dimensions of the sampler: pair 0 is the place in the pixel, then this many pairs a bounce.
+/// Dimensions of the sampler: pair 0 is the place in the pixel, 1 that on the lens; a bounce has this many pairs
+/// from 1 on, of which it does not use the first.
 const PAIRS_PER_BOUNCE: u32 = 32;
+const LENS: u32 = 1;
 const LOBE: u32 = 1;
 const DIRECTION: u32 = 2;
 const PICK: u32 = 3;
@@ -98,7 +100,9 @@ impl Batch {
         for sample in first..first + count {
             for &(i, pixel, halves) in &self.pixels {
                 let sampler = halves[sample as usize & 1].at(sample);
-                let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), size);
+                let ray = scene
+                    .viewpoint
+                    .ray_through_lens(pixel.as_vec2() + sampler.pair(0), size, || sampler.pair(LENS));
                 let entry = self.keys.len() as u32;
                 self.keys.push((i, sample));
                 let throughput = Vec3::ONE;

@@ -1,11 +1,12 @@
 //! Keys that change how the picture is made or shown, and what they answer.
 
-use super::fly::camera_flags;
+use super::flags::camera_flags;
 use super::input::Input;
 use super::keymap::Tap;
+use crate::image::develop::exposure_for;
 use crate::image::{Display, ToneMap};
-use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform};
-use crate::trace::{Integrator, RenderSettings};
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
+use crate::trace::{Film, Integrator, RenderSettings};
 use bevy_ecs::prelude::*;
 
 /// Whether refinement rests. The view still follows the camera.
@@ -35,8 +36,8 @@ pub fn change_settings(
     if let Some(size) = input.resize {
         wanted.size = size;
     }
-    for (tap, _) in &input.taps {
-        let said = match tap {
+    for press in &input.taps {
+        let said = match press.tap {
             Tap::Filter => {
                 wanted.filter = match wanted.filter {
                     None => Some(Filter::Nearest),
@@ -63,11 +64,20 @@ pub fn change_settings(
 }
 
 /// Exposure and tone map, which leave the film alone.
-pub fn change_display(input: Res<Input>, mut display: ResMut<Display>) {
+pub fn change_display(
+    input: Res<Input>,
+    film: Res<Film>,
+    mut display: ResMut<Display>,
+    mut notices: ResMut<Notices>,
+) {
     let mut wanted = *display;
-    for &(tap, shift) in &input.taps {
-        let thirds = if shift { 3.0 } else { 1.0 };
-        match tap {
+    for press in &input.taps {
+        let thirds = if press.shift { 3.0 } else { 1.0 };
+        match press.tap {
+            Tap::AutoExposure => match exposure_for(&film) {
+                Some(stops) => wanted.exposure = stops,
+                None => notices.0.push(Notice::Text("nothing bright to expose for".to_owned())),
+            },
             Tap::Brighter => wanted.exposure = step_exposure(wanted.exposure, thirds),
             Tap::Darker => wanted.exposure = step_exposure(wanted.exposure, -thirds),
             Tap::ToneMap => {
@@ -97,13 +107,13 @@ pub fn change_pause(input: Res<Input>, mut paused: ResMut<Paused>) {
 pub fn print_camera(
     input: Res<Input>,
     active: Res<ActiveCamera>,
-    cameras: Query<(&Camera, &GlobalTransform)>,
+    cameras: Query<(&Camera, &GlobalTransform, Option<&Lens>)>,
     mut notices: ResMut<Notices>,
 ) {
     if input.count(Tap::PrintCamera) > 0
-        && let Ok((camera, pose)) = cameras.get(active.0)
+        && let Ok((camera, pose, lens)) = cameras.get(active.0)
     {
-        notices.0.push(Notice::Print(camera_flags(*camera, *pose)));
+        notices.0.push(Notice::Print(camera_flags(*camera, *pose, lens.copied())));
     }
 }
 
@@ -137,19 +147,22 @@ pub fn tone_map_name(tone_map: ToneMap) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    use super::super::input::Press;
     use super::*;
     use glam::UVec2;
     use std::time::Instant;
 
     fn run(taps: &[(Tap, bool)], resize: Option<UVec2>) -> World {
+        let press = |&(tap, shift): &(Tap, bool)| Press { shift, ..Press::from(tap) };
         let mut world = World::new();
         world.init_resource::<RenderSettings>();
         world.init_resource::<Display>();
         world.init_resource::<Notices>();
         world.init_resource::<Paused>();
+        world.insert_resource(Film::new(UVec2::ONE, 0));
         world.clear_trackers();
         let mut input = Input::new(Instant::now());
-        input.taps = taps.to_vec();
+        input.taps = taps.iter().map(press).collect();
         input.resize = resize;
         world.insert_resource(input);
         let mut schedule = Schedule::default();

@@ -1,9 +1,13 @@
 //! The thread that owns the [`App`] and runs its frames, so that the window never waits for a ray.
 
+use super::cameras::{
+    Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
+};
 use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
-use super::fly::{FileCameras, FlySpeed, change_speed, choose_camera, fly_camera, look_around, take_off};
+use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
 use super::hud::Status;
 use super::input::{Command, Input};
+use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
 use crate::image::{Display, Picture};
 use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
@@ -11,6 +15,7 @@ use crate::sync::Redone;
 use crate::trace::{Geometry, RenderSettings};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
+use glam::DVec3;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -191,6 +196,10 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.insert_resource(Input::new(Instant::now()));
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
+    app.world.init_resource::<Bookmarks>();
+    let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
+    let vertical_fov = std::f32::consts::FRAC_PI_4;
+    app.world.insert_resource(Navigation { orbiting: false, pivot, vertical_fov });
     if !app.world.contains_resource::<FlySpeed>() {
         let radius = app.world.get_resource::<SceneBounds>().map_or(2.0, |bounds| bounds.radius);
         app.world.insert_resource(FlySpeed(RADII_PER_SECOND * radius));
@@ -200,12 +209,9 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             change_settings,
             change_display,
             change_pause,
-            change_speed,
-            choose_camera,
-            take_off,
-            look_around,
-            fly_camera,
-            print_camera,
+            (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
+            (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
+            (remember, print_camera).chain(),
         )
             .chain()
             .in_set(FrameSystems::Input),

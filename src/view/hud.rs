@@ -1,7 +1,8 @@
 //! Text over the picture: status lines, notices, help.
 
+use super::chord::Letters;
 use super::controls::{filter_name, integrator_name, tone_map_name};
-use super::keymap;
+use super::keymap::Keymap;
 use crate::image::ToneMap;
 use crate::scene::Filter;
 use crate::trace::Integrator;
@@ -225,8 +226,9 @@ impl<'a> Canvas<'a> {
     }
 
     /// Writes the help, as large as it fits.
-    pub fn write_help(&mut self) {
-        let lines = help_lines();
+    pub fn write_help(&mut self, keys: &Keymap, letters: &Letters) {
+        let text = keys.text(letters);
+        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
         let longest = lines.iter().map(String::len).max().unwrap_or(0) as u32;
         let needed = UVec2::new(longest, lines.len() as u32);
         let fonts = [&FONT_8X13, &FONT_6X10];
@@ -239,14 +241,6 @@ impl<'a> Canvas<'a> {
         // Darker, for there may be other text below.
         self.write_in(font, Place::Middle, &lines, 16);
     }
-}
-
-fn help_lines() -> Vec<String> {
-    let width = keymap::help().map(|(keys, _)| keys.len()).max().unwrap_or(0);
-    let mut lines: Vec<String> =
-        keymap::help().map(|(keys, text)| format!("{keys:width$}   {text}")).collect();
-    lines.push(format!("{:width$}   * restarts the accumulation", ""));
-    lines
 }
 
 /// Breaks `line` at spaces into pieces of at most `columns` characters; longer words are cut.
@@ -336,7 +330,7 @@ mod tests {
                 for place in [Place::Top, Place::Middle, Place::Bottom] {
                     canvas.write(place, &lines);
                 }
-                canvas.write_help();
+                canvas.write_help(&Keymap::default(), &Letters::default());
             }
         }
     }

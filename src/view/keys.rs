@@ -1,34 +1,37 @@
 //! The keyboard: which keys are down, and what a press does at once.
 
-use super::input::Command;
-use super::keymap::{self, Action, Hold, Tap};
+use super::input::{Command, Press};
+use super::keymap::{Action, Hold, Tap, is_modifier};
 use super::window::Viewer;
 use std::time::Instant;
 use winit::event::{ElementState, KeyEvent};
 use winit::event_loop::ActiveEventLoop;
-use winit::keyboard::PhysicalKey;
+use winit::keyboard::{Key, PhysicalKey};
 
 impl Viewer {
     pub(super) fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent, is_synthetic: bool) {
         let PhysicalKey::Code(code) = event.physical_key else {
             return;
         };
-        let control = self.held[Hold::Control as usize];
+        let [control, shift] = [Hold::Control, Hold::Fast].map(|hold| self.held[hold as usize]);
+        if let (Key::Character(text), false, false) = (&event.logical_key, control, shift) {
+            self.letters.learn(code, text);
+        }
         if event.state == ElementState::Released {
             self.keys.remove(&code);
             return self.hold();
         }
-        let Some(binding) = keymap::lookup(code, control) else {
+        let Some(entry) = self.options.keys.lookup(code, control, shift) else {
             return;
         };
-        match binding.action {
+        match entry.action {
             // Keys that are down when the window gets the focus were meant for somebody else.
-            action if is_synthetic && !keymap::is_modifier(action) => {}
+            action if is_synthetic && !is_modifier(action) => {}
             Action::Hold(_) => {
                 self.keys.insert(code);
                 self.hold();
             }
-            Action::Tap(_) if event.repeat && !binding.repeats => {}
+            Action::Tap(_) if event.repeat && !entry.repeats => {}
             Action::Tap(tap) => self.tap(event_loop, tap),
         }
     }
@@ -37,7 +40,9 @@ impl Viewer {
     pub(super) fn hold(&mut self) {
         let mut held = [false; Hold::COUNT];
         for code in &self.keys {
-            if let Some(Action::Hold(hold)) = keymap::lookup(*code, false).map(|b| b.action) {
+            if let Some(Action::Hold(hold)) =
+                self.options.keys.lookup(*code, false, false).map(|entry| entry.action)
+            {
                 held[hold as usize] = true;
             }
         }
@@ -63,7 +68,8 @@ impl Viewer {
             }
             tap => {
                 let shift = self.held[Hold::Fast as usize];
-                return self.send(Command::Tap { tap, shift, at: Instant::now() });
+                let press = Press { tap, shift, cursor: self.cursor_in_picture() };
+                return self.send(Command::Tap { press, at: Instant::now() });
             }
         }
         self.redraw();
@@ -72,6 +78,6 @@ impl Viewer {
     pub(super) fn leave(&mut self) {
         self.keys.clear();
         self.hold();
-        self.set_drag(false);
+        self.end_drag();
     }
 }

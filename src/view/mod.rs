@@ -5,13 +5,18 @@
 //! pictures the other way over a shared slot. What a key does stands in [`keymap`], and what it does
 //! to the world in [`fly`] and [`controls`].
 
+pub mod cameras;
+pub mod chord;
 pub mod controls;
 pub mod engine;
+pub mod flags;
 pub mod fly;
 pub mod hud;
 pub mod input;
 pub mod keymap;
 mod keys;
+pub mod keys_file;
+pub mod orbit;
 mod pointer;
 mod present;
 pub mod screen;
@@ -33,6 +38,8 @@ pub struct ViewOptions {
     pub size: UVec2,
     /// Name of the scene: screenshots are called `{screenshot_stem}_{n}.png`.
     pub screenshot_stem: String,
+    /// Which keys do what.
+    pub keys: keymap::Keymap,
     /// Closes the window by itself after this time.
     pub exit_after: Option<Duration>,
 }

@@ -1,21 +1,50 @@
-//! The mouse.
+//! The mouse: buttons that drag, the wheel, and where the cursor is.
 
+use super::input::{Command, Drag};
+use super::keymap::Hold;
 use super::window::Viewer;
 use glam::DVec2;
+use std::time::Instant;
 use winit::dpi::PhysicalPosition;
+use winit::event::{MouseButton, MouseScrollDelta};
 use winit::window::CursorGrabMode;
 
+/// Pixels of a touchpad that count as a notch of a wheel.
+const PIXELS_PER_NOTCH: f64 = 40.0;
+
 impl Viewer {
-    /// Begins or ends looking around with the mouse.
-    pub(super) fn set_drag(&mut self, on: bool) {
+    /// A button went down or up.
+    pub(super) fn button(&mut self, button: MouseButton, down: bool) {
+        let drag = match button {
+            MouseButton::Right => Drag::Look,
+            MouseButton::Left => Drag::Orbit,
+            MouseButton::Middle => Drag::Pan,
+            _ => return,
+        };
+        if down {
+            self.begin_drag(drag);
+        } else if self.drag.is_some_and(|(current, _)| current == drag) {
+            self.end_drag();
+        }
+    }
+
+    fn begin_drag(&mut self, drag: Drag) {
         let Some(screen) = &self.screen else { return };
-        if on && self.drag.is_none() {
-            self.drag = Some(self.cursor);
+        if self.drag.is_some() {
+            return;
+        }
+        self.drag = Some((drag, self.cursor));
+        if drag == Drag::Look {
             // X11 cannot lock the pointer: it is put back to the middle instead. Confining it as well
             // would deliver each of its motions twice.
             let _ = screen.window.set_cursor_grab(CursorGrabMode::Locked);
             screen.window.set_cursor_visible(false);
-        } else if !on && let Some(start) = self.drag.take() {
+        }
+    }
+
+    pub(super) fn end_drag(&mut self) {
+        let (Some(screen), Some((drag, start))) = (&self.screen, self.drag.take()) else { return };
+        if drag == Drag::Look {
             let _ = screen.window.set_cursor_position(start);
             let _ = screen.window.set_cursor_grab(CursorGrabMode::None);
             screen.window.set_cursor_visible(true);
@@ -23,15 +52,44 @@ impl Viewer {
     }
 
     pub(super) fn cursor_moved(&mut self, to: PhysicalPosition<f64>) {
-        self.cursor = to;
-        let (Some(_), Some(screen)) = (self.drag, &self.screen) else {
+        let from = std::mem::replace(&mut self.cursor, to);
+        self.cursor_inside = true;
+        let (Some((drag, _)), Some(screen)) = (self.drag, &self.screen) else {
             return;
         };
+        if drag != Drag::Look {
+            // The pointer is free: what counts is how far it came in the window.
+            let pixels = DVec2::new(to.x - from.x, to.y - from.y);
+            return self.send(Command::Drag { drag, pixels, at: Instant::now() });
+        }
         let middle = screen.size().as_dvec2() / 2.0;
         let off = (DVec2::new(to.x, to.y) - middle).abs();
         if off.cmpgt(middle / 2.0).any() {
             // Where the pointer is locked there is nothing to put back.
             let _ = screen.window.set_cursor_position(PhysicalPosition::new(middle.x, middle.y));
         }
+    }
+
+    /// The mouse itself moved, wherever the cursor is.
+    pub(super) fn mouse_moved(&mut self, pixels: DVec2) {
+        if let Some((Drag::Look, _)) = self.drag {
+            self.send(Command::Drag { drag: Drag::Look, pixels, at: Instant::now() });
+        }
+    }
+
+    pub(super) fn wheel(&mut self, delta: MouseScrollDelta) {
+        let notches = match delta {
+            MouseScrollDelta::LineDelta(_, y) => f64::from(y),
+            MouseScrollDelta::PixelDelta(p) => p.y / PIXELS_PER_NOTCH,
+        };
+        let dolly = self.held[Hold::Control as usize];
+        self.send(Command::Wheel { notches, dolly, at: Instant::now() });
+    }
+
+    /// From 0 at the upper left to 1 at the lower right; the middle without a cursor.
+    pub(super) fn cursor_in_picture(&self) -> DVec2 {
+        let size = self.screen.as_ref().filter(|_| self.cursor_inside).map(|screen| screen.size().as_dvec2());
+        let place = size.map(|size| DVec2::new(self.cursor.x, self.cursor.y) / size);
+        place.filter(|p| p.cmpge(DVec2::ZERO).all() && p.cmplt(DVec2::ONE).all()).unwrap_or(DVec2::splat(0.5))
     }
 }

@@ -78,7 +78,7 @@ impl Viewer {
                 canvas.write(Place::Middle, loading);
             }
             if self.help {
-                canvas.write_help();
+                canvas.write_help(&self.options.keys, &self.letters);
             }
             if !self.notice.is_empty() {
                 canvas.write(Place::Bottom, std::slice::from_ref(&self.notice));

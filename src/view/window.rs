@@ -1,8 +1,9 @@
 //! The window's thread: events in, pictures out, never a wait.
 
+use super::chord::Letters;
 use super::engine::{Engine, Published, Wake};
 use super::hud::{Level, Status};
-use super::input::Command;
+use super::input::{Command, Drag};
 use super::keymap::Hold;
 use super::screen::{Screen, vector};
 use super::{ViewError, ViewOptions};
@@ -18,7 +19,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalPosition;
-use winit::event::{DeviceEvent, DeviceId, ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event::{DeviceEvent, DeviceId, ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::KeyCode;
 use winit::window::WindowId;
@@ -31,8 +32,6 @@ const RESIZE_PATIENCE: Duration = Duration::from_millis(400);
 const NOTICE: Duration = Duration::from_secs(6);
 /// How long a closing window waits for the engine to stop.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// Pixels of a touchpad that count as a notch of a wheel.
-const PIXELS_PER_NOTCH: f64 = 40.0;
 
 /// Makes the app, on the engine's thread.
 pub type Open = Box<dyn FnOnce() -> Result<App, String> + Send>;
@@ -47,8 +46,11 @@ pub struct Viewer {
     pub(super) failure: Option<ViewError>,
     pub(super) keys: HashSet<KeyCode>,
     pub(super) held: [bool; Hold::COUNT],
-    pub(super) drag: Option<PhysicalPosition<f64>>,
+    /// What the mouse does, and where it began.
+    pub(super) drag: Option<(Drag, PhysicalPosition<f64>)>,
     pub(super) cursor: PhysicalPosition<f64>,
+    pub(super) cursor_inside: bool,
+    pub(super) letters: Letters,
     pub(super) visible: bool,
     pub(super) picture: Picture,
     pub(super) status: Option<Status>,
@@ -110,6 +112,8 @@ impl Viewer {
             held: [false; Hold::COUNT],
             drag: None,
             cursor: PhysicalPosition::default(),
+            cursor_inside: false,
+            letters: Letters::default(),
             visible: true,
             picture: Picture::default(),
             status: None,
@@ -261,23 +265,19 @@ impl ApplicationHandler<Wake> for Viewer {
             WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
                 self.key(event_loop, &event, is_synthetic);
             }
-            WindowEvent::MouseInput { state, button: MouseButton::Right, .. } => {
-                self.set_drag(state == ElementState::Pressed);
+            WindowEvent::MouseInput { state, button, .. } => {
+                self.button(button, state == ElementState::Pressed);
             }
             WindowEvent::CursorMoved { position, .. } => self.cursor_moved(position),
-            WindowEvent::MouseWheel { delta, .. } => self.send(Command::Wheel(match delta {
-                MouseScrollDelta::LineDelta(_, y) => f64::from(y),
-                MouseScrollDelta::PixelDelta(p) => p.y / PIXELS_PER_NOTCH,
-            })),
+            WindowEvent::CursorLeft { .. } => self.cursor_inside = false,
+            WindowEvent::MouseWheel { delta, .. } => self.wheel(delta),
             _ => {}
         }
     }
 
     fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
-        if let DeviceEvent::MouseMotion { delta: (x, y) } = event
-            && self.drag.is_some()
-        {
-            self.send(Command::Look { pixels: DVec2::new(x, y), at: Instant::now() });
+        if let DeviceEvent::MouseMotion { delta: (x, y) } = event {
+            self.mouse_moved(DVec2::new(x, y));
         }
     }
 

@@ -50,6 +50,8 @@
 //! target = [0, 1, 0]           # *
 //! up = [0, 1, 0]
 //! vertical_fov = 40.0          # degrees, 45 if missing; or orthographic_height in scene units
+//! lens_radius = 0.05           # scene units; missing: all is sharp
+//! focus_distance = 4.0         # of what is sharp, scene units; that of the target if missing
 //!
 //! [render]
 //! integrator = "path"          # or "direct"
