@@ -5,7 +5,7 @@ use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::propagate_transforms;
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
-use crate::trace::noise::relative_noise;
+use crate::trace::noise;
 use crate::trace::{
     Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint,
     trace_adaptive, trace_pass,
@@ -78,8 +78,10 @@ pub struct FrameStats {
     pub done: bool,
     /// Estimated relative noise of the picture (0.02 = 2 %), from two samples per pixel on.
     pub noise: Option<f64>,
-    /// Samples per pixel that `noise` is of.
-    noise_samples: u32,
+    /// How well it is known: see [`noise::Noise::doubt`].
+    pub noise_doubt: f64,
+    /// Samples per pixel that `noise` is of; 0 if it is of none.
+    pub noise_samples: u32,
     /// Rays since the world was made, by kind.
     pub rays: RayCounts,
     /// Seconds spent tracing since the world was made.
@@ -277,7 +279,9 @@ pub fn trace_frame(
         && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
         && complete != stats.noise_samples
     {
-        stats.noise = relative_noise(&film);
+        let noise = noise::estimate(&film);
+        stats.noise = noise.map(|noise| noise.relative);
+        stats.noise_doubt = noise.map_or(0.0, |noise| noise.doubt);
         stats.noise_samples = complete;
     }
 }

@@ -5,9 +5,10 @@ use super::cameras::{
 };
 use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
 use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
-use super::hud::Status;
 use super::input::{Command, Input};
+use super::instrument::{Instrument, note_noise};
 use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
+use super::status::Status;
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
 use crate::image::{Display, Picture};
 use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
@@ -197,6 +198,7 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
     app.world.init_resource::<Bookmarks>();
+    app.world.init_resource::<Instrument>();
     let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
     let vertical_fov = std::f32::consts::FRAC_PI_4;
     app.world.insert_resource(Navigation { orbiting: false, pivot, vertical_fov });
@@ -216,6 +218,7 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             .chain()
             .in_set(FrameSystems::Input),
     );
+    app.add_systems(note_noise.in_set(FrameSystems::Present));
 }
 
 /// Applies `command`; the first question for another view is remembered in `asked`.
@@ -234,7 +237,8 @@ fn status(app: &App) -> Status {
         sample_target: world.resource::<FrameBudget>().sample_target,
         done: stats.done,
         paused: world.resource::<Paused>().0,
-        noise: stats.noise,
+        noise: stats.noise.map(|noise| (noise, stats.noise_doubt)),
+        graph: Arc::clone(&world.resource::<Instrument>().graph),
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         resets: world.resource::<Redone>().resets,
@@ -242,6 +246,7 @@ fn status(app: &App) -> Status {
         exposure: display.exposure,
         tone_map: display.tone_map,
         speed: world.resource::<FlySpeed>().0,
+        orbiting: world.resource::<Navigation>().orbiting,
         size: settings.size,
         integrator: settings.integrator,
         filter: settings.filter,

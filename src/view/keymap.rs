@@ -102,6 +102,8 @@ pub enum Tap {
     Filter,
     /// Next integrator.
     Integrator,
+    /// Show or hide the curve of the noise.
+    Graph,
     /// Next level of detail of the status lines.
     HudLevel,
     /// Show or hide the help.
@@ -271,6 +273,7 @@ pub const TABLE: &[Section] = &[
     (
         "Window",
         &[
+            row("noise over time", &[tap("graph", Tap::Graph, &["G"])]),
             row("status: none, short, long", &[tap("hud", Tap::HudLevel, &["Z"])]),
             row("this help", &[tap("help", Tap::Help, &["H", "Slash"])]),
             row("full screen", &[tap("full_screen", Tap::FullScreen, &["F11"])]),

@@ -54,9 +54,10 @@ impl Viewer {
 
     pub(super) fn tap(&mut self, event_loop: &ActiveEventLoop, tap: Tap) {
         match tap {
-            Tap::HudLevel => self.level = self.level.next(),
-            Tap::Help => self.help = !self.help,
-            Tap::Escape => self.help = false,
+            Tap::HudLevel => self.ui.level = self.ui.level.next(),
+            Tap::Graph => self.ui.graph = !self.ui.graph,
+            Tap::Help => self.ui.help = !self.ui.help,
+            Tap::Escape => self.ui.help = false,
             Tap::Quit => event_loop.exit(),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {

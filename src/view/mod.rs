@@ -11,8 +11,8 @@ pub mod controls;
 pub mod engine;
 pub mod flags;
 pub mod fly;
-pub mod hud;
 pub mod input;
+pub mod instrument;
 pub mod keymap;
 mod keys;
 pub mod keys_file;
@@ -21,6 +21,8 @@ mod pointer;
 mod present;
 pub mod screen;
 pub mod screenshot;
+pub mod status;
+pub mod ui;
 pub mod window;
 
 use crate::app::App;

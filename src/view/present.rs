@@ -2,9 +2,10 @@
 
 use super::ViewError;
 use super::engine::{Wake, lock};
-use super::hud::{Canvas, Measured, Place, status_lines, text_scale};
 use super::screen::Presented;
 use super::screenshot;
+use super::status::Measured;
+use super::ui::Content;
 use super::window::Viewer;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -13,8 +14,8 @@ use winit::event_loop::ActiveEventLoop;
 const SOFTWARE_PACE: Duration = Duration::from_millis(80);
 /// Between changes of the title.
 const TITLE_PACE: Duration = Duration::from_millis(500);
-/// Latencies that the median is taken of.
-const LATENCIES: usize = 31;
+/// Latencies that median and percentile are taken of.
+const LATENCIES: usize = 256;
 
 impl Viewer {
     /// Takes what the engine has published.
@@ -60,28 +61,23 @@ impl Viewer {
             return;
         };
         let scale_factor = screen.window.scale_factor();
-        let lines = match &self.status {
-            Some(status) => status_lines(self.level, status, measured),
-            None => Vec::new(),
+        let content = Content {
+            status: self.status.as_ref(),
+            measured,
+            loading: self.status.is_none().then_some(self.options.screenshot_stem.as_str()),
+            notice: &self.notice,
+            keys: &self.options.keys,
+            letters: &self.letters,
         };
-        let loading =
-            self.status.is_none().then(|| [format!("loading {} ...", self.options.screenshot_stem)]);
+        let (ui, picture) = (&mut self.ui, &self.picture);
         let outcome = screen.draw(|bytes, size| {
-            if self.picture.rgba.is_empty() {
+            if picture.rgba.is_empty() {
                 bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
             } else {
-                screenshot::scale_into(&self.picture.rgba, self.picture.size, bytes, size);
+                screenshot::scale_into(&picture.rgba, picture.size, bytes, size);
             }
-            let mut canvas = Canvas::new(bytes, size, text_scale(scale_factor, size.y));
-            canvas.write(Place::Top, &lines);
-            if let Some(loading) = &loading {
-                canvas.write(Place::Middle, loading);
-            }
-            if self.help {
-                canvas.write_help(&self.options.keys, &self.letters);
-            }
-            if !self.notice.is_empty() {
-                canvas.write(Place::Bottom, std::slice::from_ref(&self.notice));
+            if !ui.is_bare(&content) {
+                ui.draw(bytes, size, scale_factor, &content);
             }
         });
         let now = Instant::now();
@@ -135,7 +131,9 @@ impl Viewer {
         };
         let mut sorted: Vec<Duration> = self.latencies.iter().copied().collect();
         sorted.sort_unstable();
-        let latency = sorted.get(sorted.len() / 2).map(Duration::as_secs_f64);
+        let rank =
+            |part: f64| sorted.get(((sorted.len() as f64 * part) as usize).min(sorted.len().max(1) - 1));
+        let latency = rank(0.5).zip(rank(0.99)).map(|(m, w)| (m.as_secs_f64(), w.as_secs_f64()));
         Measured { pictures_per_second, latency }
     }
 

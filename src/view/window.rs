@@ -2,10 +2,11 @@
 
 use super::chord::Letters;
 use super::engine::{Engine, Published, Wake};
-use super::hud::{Level, Status};
 use super::input::{Command, Drag};
 use super::keymap::Hold;
 use super::screen::{Screen, vector};
+use super::status::Status;
+use super::ui::Ui;
 use super::{ViewError, ViewOptions};
 use crate::app::App;
 use crate::image::Picture;
@@ -56,8 +57,7 @@ pub struct Viewer {
     pub(super) status: Option<Status>,
     pub(super) moving: bool,
     pub(super) asked: Option<Instant>,
-    pub(super) level: Level,
-    pub(super) help: bool,
+    pub(super) ui: Ui,
     pub(super) notice: String,
     pub(super) title: String,
     pub(super) titled_at: Option<Instant>,
@@ -119,8 +119,7 @@ impl Viewer {
             status: None,
             moving: true,
             asked: None,
-            level: Level::default(),
-            help: false,
+            ui: Ui::default(),
             notice: String::new(),
             title: String::new(),
             titled_at: None,
