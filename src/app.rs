@@ -51,9 +51,10 @@ pub struct FrameBudget {
     pub sample_target: u32,
     /// Samples per pixel of one pass, if there is no time limit.
     pub pass_samples: u32,
-    /// For somebody who watches: a coarse whole picture first when the film was reset, and a developed
-    /// [`Picture`] at the end of each frame.
+    /// For somebody who watches: a coarse whole picture first when the film was reset.
     pub preview: bool,
+    /// For somebody who watches: a developed [`Picture`] at the end of each frame.
+    pub develop: bool,
 }
 
 impl Default for FrameBudget {
@@ -65,6 +66,7 @@ impl Default for FrameBudget {
             sample_target: 64,
             pass_samples: 1,
             preview: false,
+            develop: false,
         }
     }
 }
@@ -198,7 +200,7 @@ fn frame_schedule() -> Schedule {
             .chain()
             .in_set(Sync),
         trace_frame.in_set(Trace),
-        develop_film.run_if(|budget: Res<FrameBudget>| budget.preview).in_set(Present),
+        develop_film.run_if(|budget: Res<FrameBudget>| budget.develop).in_set(Present),
     ));
     frame
 }

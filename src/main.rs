@@ -11,7 +11,7 @@ use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use penumbra::report::{Report, ReportError, measure_all, write};
 #[cfg(feature = "view")]
-use penumbra::{app::FrameBudget, open::open, trace::RenderSettings};
+use penumbra::{app::FrameBudget, open::open, render::open_reference, trace::RenderSettings};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -76,11 +76,19 @@ fn window(args: &WindowArgs) -> u8 {
             return exit::BAD_COMMAND_LINE;
         }
     };
+    let reference = match args.output.reference.as_deref().map(open_reference).transpose() {
+        Ok(reference) => reference,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::FAILED;
+        }
+    };
     let (wishes, even) = (args.scene.wishes(&args.output), args.scene.even);
     let options = ViewOptions {
         title: format!("Penumbra – {}", source.name()),
         size: wishes.size.unwrap_or(RenderSettings::default().size),
         screenshot_stem: source.name(),
+        reference,
         keys,
         exit_after: None,
     };
@@ -118,6 +126,10 @@ fn instead_of_window(args: &WindowArgs) -> u8 {
 }
 
 fn headless(scene: &SceneArgs, output: &OutputArgs) -> u8 {
+    if output.reference.is_some() && output.error_log.is_none() {
+        eprintln!("error: --reference needs --error-log FILE.csv to write the errors to");
+        return exit::BAD_COMMAND_LINE;
+    }
     let mut outputs = match files_to_write(&output.output) {
         Ok(outputs) => outputs,
         Err(error) => {

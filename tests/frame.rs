@@ -12,6 +12,7 @@ use penumbra::scene::{
     TriangleMesh, Visible, Wrap,
 };
 use penumbra::sync::Redone;
+use penumbra::trace::explain::{Kind, explain};
 use penumbra::trace::{Film, Integrator, RenderSettings};
 use std::sync::Arc;
 
@@ -376,6 +377,7 @@ fn a_watched_frame_shows_a_whole_picture_even_if_interrupted_at_once() {
     {
         let mut budget = stage.app.world.resource_mut::<FrameBudget>();
         budget.preview = true;
+        budget.develop = true;
         budget.time = Some(std::time::Duration::ZERO);
         budget.interrupt.store(true, std::sync::atomic::Ordering::Relaxed);
     }
@@ -398,4 +400,41 @@ fn empty_worlds_and_dark_scenes_are_pictures_too() {
     assert!(stage.app.world.despawn(lamp));
     stage.app.frame();
     assert_eq!(stage.film().pixel(20, 15).mean(), DVec3::ZERO);
+}
+
+#[test]
+fn an_explanation_is_of_the_very_samples() {
+    let mut stage = stage();
+    stage
+        .app
+        .world
+        .spawn((Light::Point { intensity: Vec3::ONE }, Transform::from_translation(DVec3::Y * 2.0)));
+    stage.app.world.resource_mut::<RenderSettings>().integrator = Integrator::Path;
+    {
+        let mut budget = stage.app.world.resource_mut::<FrameBudget>();
+        (budget.sample_target, budget.pass_samples) = (32, 32);
+    }
+    stage.app.frame();
+    let scene = penumbra::sync::traceable(&stage.app.world);
+    let (mut lit, mut blocked) = (0, 0);
+    for (x, y) in (0..SIZE.y).flat_map(|y| (0..SIZE.x).map(move |x| (x, y))) {
+        let told = explain(&scene, UVec2::new(x, y), 0..32, 10.0);
+        assert_eq!(told.radiance.len(), 32);
+        // What the film has added up, and what lights bring, each by itself.
+        let sum: DVec3 = told.radiance.iter().map(|r| r.as_dvec3()).sum();
+        let film = stage.film().pixel(x, y).mean();
+        assert!((sum / 32.0 - film).length() <= 1e-9 * film.length(), "{x} {y}: {sum} {film}");
+        let brought: f32 = told.lights.iter().map(|row| row.contribution).sum();
+        let luminance = penumbra::scene::color::luminance(film.as_vec3());
+        assert!(brought <= luminance * 1.001 + 1e-6, "{x} {y}: {brought} of {luminance}");
+        for row in &told.lights {
+            assert!(row.lit + row.dark <= row.samples, "{row:?}");
+            assert!(row.lit == 0 || row.contribution > 0.0, "{row:?}");
+        }
+        let count = |kind| told.segments.iter().filter(|s| s.kind == kind).count();
+        assert_eq!(count(Kind::Camera), 32);
+        assert_eq!(count(Kind::Lit), told.lights.iter().map(|row| row.lit as usize).sum::<usize>());
+        (lit, blocked) = (lit + count(Kind::Lit), blocked + count(Kind::Shadow));
+    }
+    assert!(lit > 1000 && blocked > 30, "the quad throws a shadow: {lit} {blocked}");
 }

@@ -550,3 +550,85 @@ fn the_camera_that_is_copied_renders_what_the_window_shows() {
     assert!(colors(&rendered) > 50, "nothing is seen");
     assert_eq!(difference(&rendered, &shown), 0.0);
 }
+
+#[test]
+fn views_of_pixels_and_cards_show_at_one_press_also_when_the_picture_rests() {
+    let Some(desktop) = desktop("views") else {
+        return;
+    };
+    let truth = desktop.directory.join("truth.exr");
+    let size = &SMALL[..2];
+    let mut render = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
+    let render = render.args(["render", "cornell", "--spp", "64", "-q"]).args(size).arg("-o").arg(&truth);
+    assert!(render.status().unwrap().success());
+    let reference = ["--reference", truth.to_str().unwrap()];
+    let mut program = desktop.start(&[SMALL, &reference].concat());
+    desktop.hide_status(&mut program);
+    let beauty = desktop.shot(&program);
+    let mut seen = vec![beauty.clone()];
+    // Noise, error, samples, boxes, triangles, normals, base colour, depth, not finite.
+    for view in 1..=9 {
+        desktop.xdotool(["key", "v"]);
+        pause(900);
+        // The notice stays for a while at the bottom.
+        let shown = image::imageops::crop_imm(&desktop.shot(&program), 0, 0, 320, 190).to_image();
+        let others = seen.iter().map(|s| image::imageops::crop_imm(s, 0, 0, 320, 190).to_image());
+        // Samples are as many everywhere, and boxes on the walls.
+        assert!(view == 3 || colors(&shown) > 1, "view {view} shows next to nothing");
+        assert!(others.into_iter().all(|other| difference(&shown, &other) > 0.05), "view {view} is another");
+        seen.push(desktop.shot(&program));
+    }
+    desktop.xdotool(["key", "v"]);
+    pause(7000);
+    assert_eq!(difference(&beauty, &desktop.shot(&program)), 0.0, "the picture is back");
+    for key in ["h", "g", "z"] {
+        desktop.xdotool(["key", key]);
+        pause(400);
+        assert!(difference(&beauty, &desktop.shot(&program)) > 0.05, "{key} shows nothing");
+        desktop.xdotool(["key", key]);
+        pause(400);
+    }
+}
+
+/// Pixels in which green is far above red and blue, and those in which red is above both.
+fn green_and_red(picture: &RgbImage) -> (usize, usize) {
+    let above = |a: u8, b: u8, c: u8| i32::from(a) > i32::from(b.max(c)) + 60;
+    let green = picture.pixels().filter(|p| above(p[1], p[0], p[2])).count();
+    let red = picture.pixels().filter(|p| above(p[0], p[1], p[2])).count();
+    (green, red)
+}
+
+#[test]
+fn a_pinned_pixel_shows_its_rays_and_boxes_show_the_hierarchy() {
+    let Some(desktop) = desktop("debug") else {
+        return;
+    };
+    let white = "[[model]]\nfile = 'floor.obj'\n[[light]]\nkind = 'parallelogram'\ncorner = [-1, 3, -1]\n\
+                 edge_u = [2, 0, 0]\nedge_v = [0, 0, 2]\nradiance = [1, 1, 1]\n[camera]\nposition = [0, 2, 6]\n\
+                 target = [0, 0.5, 0]\n";
+    let floor = "v -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nv -1 1 -1\nv 1 1 -1\nv 1 1 1\nv -1 1 1\n\
+                 f 1 4 3 2\nf 5 8 7 6\n";
+    std::fs::write(desktop.directory.join("scene.toml"), white).unwrap();
+    std::fs::write(desktop.directory.join("floor.obj"), floor).unwrap();
+    let mut program = desktop.start(&["scene.toml", "--resolution", "320x240", "--spp", "4"]);
+    desktop.hide_status(&mut program);
+    let plain = desktop.shot(&program);
+    assert!(green_and_red(&plain).0 < 10, "a grey scene");
+    // Without a mouse it is the pixel in the middle: on the roof, in full light.
+    desktop.xdotool(["key", "p"]);
+    pause(700);
+    let (green, red) = green_and_red(&desktop.shot(&program));
+    assert!(green > 30 && red < green / 4, "{green} green, {red} red");
+    // Below the roof all of the lamp is hidden.
+    desktop.xdotool(["mousemove", "--window", &program.window, "160", "165", "click", "1"]);
+    pause(700);
+    let (green, red) = green_and_red(&desktop.shot(&program));
+    assert!(red > 30 && green < red, "{green} green, {red} red");
+    // And all is gone again, but for the notice.
+    desktop.xdotool(["key", "p"]);
+    pause(7000);
+    assert_eq!(difference(&plain, &desktop.shot(&program)), 0.0);
+    desktop.xdotool(["key", "b"]);
+    pause(500);
+    assert!(difference(&plain, &desktop.shot(&program)) > 0.01, "a box around everything");
+}

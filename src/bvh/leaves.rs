@@ -80,6 +80,12 @@ impl Leaves {
         })
     }
 
+    /// The triangles of a leaf, with their numbers.
+    pub fn triangles(&self, (first, count): (usize, usize)) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        let rows = &self.rows[first * 9..(first + count) * 9];
+        (0..count).map(move |i| (self.ids[first + i], Self::corners(rows, count, i)))
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.rows) + size_of_val(&*self.ids)
     }

@@ -95,8 +95,8 @@ pub struct OutputArgs {
     /// Go on with this film; N of --spp counts what it holds
     #[arg(long, value_name = "FILM")]
     pub resume: Option<PathBuf>,
-    /// Picture (.exr best) or film to measure the true error by
-    #[arg(long, value_name = "FILE", requires = "error_log")]
+    /// Picture (.exr best) or film to measure the true error by, in the window or for --error-log
+    #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
     /// Table of true error against seconds and samples
     #[arg(long, value_name = "FILE.csv", requires = "reference")]

@@ -14,65 +14,66 @@ use super::surface::Interaction;
 use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
 use glam::{UVec2, Vec3};
+use std::ops::Range;
 
 /// One path under way.
 #[derive(Clone, Copy, Debug)]
-struct Path {
+pub(super) struct Path {
     /// Which entry of the batch it adds to.
     entry: u32,
-    sampler: Sampler,
-    ray: Ray,
+    pub sampler: Sampler,
+    pub ray: Ray,
     /// What light at the ray's end is worth at the eye.
     throughput: Vec3,
-    depth: u32,
+    pub depth: u32,
     /// How the last bounce chose the ray's direction; `None`: no light sample could have found it.
-    bounce: Option<Bounce>,
+    pub bounce: Option<Bounce>,
     /// Only collects what shines at its end.
     last: bool,
 }
 
 /// The smooth bounce that a ray comes from.
 #[derive(Clone, Copy, Debug)]
-struct Bounce {
+pub(super) struct Bounce {
     pdf: f32,
     normal: Vec3,
 }
 
 /// A ray toward a light, and what it brings if nothing is in the way.
 #[derive(Clone, Copy, Debug)]
-struct Shadow {
+pub(super) struct Shadow {
     entry: u32,
-    sampler: Sampler,
-    ray: Ray,
-    light: u32,
-    triangle: Option<(u32, u32)>,
-    contribution: Vec3,
-    key: u32,
+    pub sampler: Sampler,
+    pub ray: Ray,
+    pub light: u32,
+    pub triangle: Option<(u32, u32)>,
+    pub contribution: Vec3,
+    pub key: u32,
 }
 
 /// Buffers of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Batch {
     pixels: Vec<(u32, UVec2, [Sampler; 2])>,
-    paths: Vec<Path>,
+    pub(super) paths: Vec<Path>,
     next: Vec<Path>,
-    shadows: Vec<Shadow>,
+    pub(super) shadows: Vec<Shadow>,
     rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
+    pub(super) hits: Vec<Option<Hit>>,
     ignored: Vec<Option<(u32, u32)>>,
     blocked: Vec<bool>,
-    radiance: Vec<Vec3>,
+    pub(super) radiance: Vec<Vec3>,
     keys: Vec<(u32, u32)>,
 }
 
 /// Dimensions of the sampler: pair 0 is the place in the pixel, 1 that on the lens; a bounce has this many pairs
 /// from 1 on, of which it does not use the first.
-const PAIRS_PER_BOUNCE: u32 = 32;
+pub(super) const PAIRS_PER_BOUNCE: u32 = 32;
 const LENS: u32 = 1;
 const LOBE: u32 = 1;
 const DIRECTION: u32 = 2;
-const PICK: u32 = 3;
-const LIGHT: u32 = 4;
+pub(super) const PICK: u32 = 3;
+pub(super) const LIGHT: u32 = 4;
 /// From this depth on a path may end by chance.
 const ROULETTE_DEPTH: u32 = 4;
 
@@ -97,7 +98,35 @@ impl Batch {
             let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
             (i, pixel, Sampler::halves(pixel, scene.settings))
         }));
-        for sample in first..first + count {
+        self.begin(scene, size, first..first + count);
+        rays.camera += self.paths.len() as u64;
+        while !self.paths.is_empty() {
+            self.wave(scene, rays);
+        }
+        let mut dropped = 0;
+        let pixels = tile.pixels_mut();
+        for (&(pixel, sample), &radiance) in self.keys.iter().zip(&self.radiance) {
+            dropped += u64::from(!pixels[pixel as usize].add(sample, radiance));
+        }
+        tile.dropped += dropped;
+        match color {
+            None => tile.next_sample += count,
+            Some(color) => tile.more[color] += count,
+        }
+    }
+
+    /// Starts these samples of one pixel.
+    pub(super) fn begin_pixel(&mut self, scene: &TraceScene, pixel: UVec2, samples: Range<u32>) {
+        self.paths.clear();
+        self.keys.clear();
+        self.pixels.clear();
+        self.pixels.push((0, pixel, Sampler::halves(pixel, scene.settings)));
+        self.begin(scene, scene.settings.size, samples);
+    }
+
+    /// Starts these samples of all pixels.
+    fn begin(&mut self, scene: &TraceScene, size: UVec2, samples: Range<u32>) {
+        for sample in samples {
             for &(i, pixel, halves) in &self.pixels {
                 let sampler = halves[sample as usize & 1].at(sample);
                 let ray = scene
@@ -119,23 +148,16 @@ impl Batch {
         }
         self.radiance.clear();
         self.radiance.resize(self.keys.len(), Vec3::ZERO);
-        rays.camera += self.paths.len() as u64;
-        while !self.paths.is_empty() {
-            self.wave(scene, rays);
-        }
-        let mut dropped = 0;
-        let pixels = tile.pixels_mut();
-        for (&(pixel, sample), &radiance) in self.keys.iter().zip(&self.radiance) {
-            dropped += u64::from(!pixels[pixel as usize].add(sample, radiance));
-        }
-        tile.dropped += dropped;
-        match color {
-            None => tile.next_sample += count,
-            Some(color) => tile.more[color] += count,
-        }
     }
 
     fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
+        self.shade(scene);
+        rays.shadow += self.connect_lights(scene);
+        rays.bounce += self.go_on();
+    }
+
+    /// Traces all rays, and shades where they end.
+    pub(super) fn shade(&mut self, scene: &TraceScene) {
         self.next.clear();
         self.shadows.clear();
         self.rays.clear();
@@ -148,13 +170,16 @@ impl Batch {
             let path = self.paths[i];
             self.arrive(scene, &path, self.hits[i]);
         }
-        rays.shadow += self.connect_lights(scene);
-        rays.bounce += self.next.len() as u64;
+    }
+
+    /// Turns to the paths that go on; returns how many.
+    pub(super) fn go_on(&mut self) -> u64 {
         std::mem::swap(&mut self.paths, &mut self.next);
+        self.paths.len() as u64
     }
 
     /// Adds the light of those queued shadow rays that nothing blocks; returns how many were traced.
-    fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
+    pub(super) fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
         self.shadows.retain(|shadow| !scene.lights.blocks(&shadow.ray, shadow.light));
         // Rays to one light go similar ways. Stable: the sum of a path does not depend on its neighbours.
         if scene.lights.len() > 1 {

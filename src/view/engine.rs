@@ -4,15 +4,22 @@ use super::cameras::{
     Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
 };
 use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
+use super::debug::layer::Layer;
+use super::debug::{CurrentLayer, Debug, DebugLines, change_debug, draw_layer, explain_pinned};
 use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
 use super::input::{Command, Input};
-use super::instrument::{Instrument, note_noise};
+use super::instrument::{Instrument, Reference, note_noise};
 use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
+use super::pixel_view::{
+    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_pixel_view, develop_pixel_view,
+    refine_first_hits,
+};
 use super::status::Status;
-use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
+use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
+use crate::image::compare::LinearImage;
 use crate::image::{Display, Picture};
 use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
-use crate::sync::Redone;
+use crate::sync::{Redone, reset_film};
 use crate::trace::{Geometry, RenderSettings};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
@@ -32,6 +39,10 @@ const RESTING_SHARE: f64 = 0.1;
 
 /// Speed at the start, in radii of the scene per second.
 const RADII_PER_SECOND: f64 = 0.5;
+
+/// Whether there is something left to do although all samples are there. Set by systems, lowered before each frame.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pending(pub bool);
 
 /// What the engine tells the window's thread to look at.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,6 +64,8 @@ pub struct Published {
     pub picture: Option<Picture>,
     /// A picture that is no longer needed, for its memory.
     pub spare: Picture,
+    /// What is drawn over the picture.
+    pub layer: Option<Arc<Layer>>,
     /// For the status lines. `None` until the scene is open.
     pub status: Option<Status>,
     /// Whether the view is changing, so that pictures are to be shown at once.
@@ -63,6 +76,8 @@ pub struct Published {
 
 /// The engine's ends of what connects it with the window.
 pub struct Engine<W> {
+    /// A picture to measure the true error by.
+    pub reference: Option<LinearImage>,
     /// From the window.
     pub commands: Receiver<Command>,
     /// Raised by the window after a command.
@@ -80,10 +95,14 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl<W: Fn(Wake)> Engine<W> {
     /// Opens the app and runs frames until told to quit.
-    pub fn run(self, open: impl FnOnce() -> Result<App, String>) {
+    pub fn run(mut self, open: impl FnOnce() -> Result<App, String>) {
         // A bug in a frame must end in a message, not in a window that never changes again.
         let outcome = catch_unwind(AssertUnwindSafe(|| match open() {
-            Ok(mut app) => self.run_frames(&mut app),
+            Ok(mut app) => {
+                let reference = self.reference.take().map(Reference::new);
+                app.world.insert_resource(Instrument::against(reference));
+                self.run_frames(&mut app);
+            }
             Err(why) => (self.wake)(Wake::OpenFailed(why)),
         }));
         if let Err(panic) = outcome {
@@ -127,6 +146,7 @@ impl<W: Fn(Wake)> Engine<W> {
 
             let resets = app.world.resource::<Redone>().resets;
             let version = app.world.resource::<Picture>().version;
+            app.world.resource_mut::<Pending>().0 = false;
             app.frame();
             app.world.resource_mut::<Input>().end_frame();
 
@@ -136,7 +156,9 @@ impl<W: Fn(Wake)> Engine<W> {
                 view_changed_at = Instant::now();
             }
             let held = app.world.resource::<Input>().is_moving();
-            idle = !held && (stats.done || app.world.resource::<Paused>().0);
+            idle = !held
+                && (stats.done || app.world.resource::<Paused>().0)
+                && !app.world.resource::<Pending>().0;
             self.say(app);
             self.publish(app, version, moving, asked);
         }
@@ -158,7 +180,14 @@ impl<W: Fn(Wake)> Engine<W> {
             published.picture = Some(copy);
             published.asked = published.asked.or(asked);
         }
-        let news = has_picture || published.status.as_ref() != Some(&status);
+        let layer = app.world.resource::<CurrentLayer>().0.clone();
+        let same_layer = match (&layer, &published.layer) {
+            (Some(new), Some(old)) => Arc::ptr_eq(new, old),
+            (None, None) => true,
+            _ => false,
+        };
+        published.layer = layer;
+        let news = has_picture || !same_layer || published.status.as_ref() != Some(&status);
         published.status = Some(status);
         published.moving = moving;
         drop(published);
@@ -188,7 +217,7 @@ impl<W: Fn(Wake)> Engine<W> {
 fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     let mut budget = app.world.resource_mut::<FrameBudget>();
     budget.interrupt = Arc::clone(interrupt);
-    budget.preview = true;
+    (budget.preview, budget.develop) = (true, true);
     // The camera may be asked for its place before the first frame has run.
     let propagated = app.world.run_system_once(propagate_transforms);
     debug_assert!(propagated.is_ok());
@@ -198,7 +227,14 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
     app.world.init_resource::<Bookmarks>();
-    app.world.init_resource::<Instrument>();
+    app.world.init_resource::<Pending>();
+    app.world.init_resource::<PixelView>();
+    app.world.init_resource::<CurrentLegend>();
+    app.world.init_resource::<DepthWanted>();
+    app.world.init_resource::<FirstHits>();
+    app.world.init_resource::<Debug>();
+    app.world.init_resource::<DebugLines>();
+    app.world.init_resource::<CurrentLayer>();
     let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
     let vertical_fov = std::f32::consts::FRAC_PI_4;
     app.world.insert_resource(Navigation { orbiting: false, pivot, vertical_fov });
@@ -213,12 +249,14 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             change_pause,
             (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
             (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
-            (remember, print_camera).chain(),
+            (remember, print_camera, choose_pixel_view, change_debug).chain(),
         )
             .chain()
             .in_set(FrameSystems::Input),
     );
-    app.add_systems(note_noise.in_set(FrameSystems::Present));
+    app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
+    app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
+    app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
 }
 
 /// Applies `command`; the first question for another view is remembered in `asked`.
@@ -239,6 +277,8 @@ fn status(app: &App) -> Status {
         paused: world.resource::<Paused>().0,
         noise: stats.noise.map(|noise| (noise, stats.noise_doubt)),
         graph: Arc::clone(&world.resource::<Instrument>().graph),
+        legend: world.resource::<CurrentLegend>().0.clone(),
+        debug: world.resource::<Debug>().status(),
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         resets: world.resource::<Redone>().resets,

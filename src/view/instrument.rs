@@ -84,6 +84,14 @@ pub struct Instrument {
     noted: u32,
 }
 
+impl Instrument {
+    /// One that measures the true error, if there is a reference.
+    #[must_use]
+    pub fn against(reference: Option<Reference>) -> Self {
+        Self { reference, ..Self::default() }
+    }
+}
+
 /// Fewer looks than this are no curve to compare with: flying would leave nothing else.
 const WORTH_KEEPING: usize = 4;
 /// Round noise levels that one wants to reach.

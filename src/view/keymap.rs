@@ -98,6 +98,24 @@ pub enum Tap {
     AutoExposure,
     /// Next tone map.
     ToneMap,
+    /// What the colours stand for.
+    PixelView,
+    /// Explain the pixel under the cursor, or no pixel any more.
+    Pin,
+    /// The left mouse button, without a drag.
+    Click,
+    /// No boxes of the hierarchy, those of a level, those of the leaves.
+    Boxes,
+    /// Boxes of a higher level.
+    LevelUp,
+    /// Boxes of a lower level.
+    LevelDown,
+    /// One box more on the way of the pinned pixel's ray.
+    NextStep,
+    /// One box fewer.
+    PreviousStep,
+    /// Near first or priority queue.
+    Order,
     /// Next texture filter.
     Filter,
     /// Next integrator.
@@ -266,8 +284,34 @@ pub const TABLE: &[Section] = &[
             ),
             row("exposure by what is seen", &[tap("auto_exposure", Tap::AutoExposure, &["X"])]),
             row("tone map (Shift: back)", &[tap("tone_map", Tap::ToneMap, &["T"])]),
+            row(
+                "show noise, samples, boxes, triangles, normals ... (Shift: back)",
+                &[tap("pixel_view", Tap::PixelView, &["V"])],
+            ),
             row("texture filter: file's, nearest, bilinear *", &[tap("filter", Tap::Filter, &["N"])]),
             row("direct light / global illumination *", &[tap("integrator", Tap::Integrator, &["I"])]),
+        ],
+    ),
+    (
+        "Understanding",
+        &[
+            row("rays of the pixel under the cursor (then click others)", &[tap("pin", Tap::Pin, &["P"])]),
+            row("boxes of the hierarchy: none, a level, leaves", &[tap("boxes", Tap::Boxes, &["B"])]),
+            row(
+                "a level up, down",
+                &[
+                    again("level_up", Tap::LevelUp, &["Ctrl+BracketLeft"]),
+                    again("level_down", Tap::LevelDown, &["Ctrl+BracketRight"]),
+                ],
+            ),
+            row(
+                "the pixel's ray through the boxes: step back, on",
+                &[
+                    again("previous_step", Tap::PreviousStep, &["Semicolon"]),
+                    again("next_step", Tap::NextStep, &["Quote"]),
+                ],
+            ),
+            row("order: near first, priority queue", &[tap("order", Tap::Order, &["O"])]),
         ],
     ),
     (

@@ -8,6 +8,7 @@
 pub mod cameras;
 pub mod chord;
 pub mod controls;
+pub mod debug;
 pub mod engine;
 pub mod flags;
 pub mod fly;
@@ -17,6 +18,7 @@ pub mod keymap;
 mod keys;
 pub mod keys_file;
 pub mod orbit;
+pub mod pixel_view;
 mod pointer;
 mod present;
 pub mod screen;
@@ -26,6 +28,7 @@ pub mod ui;
 pub mod window;
 
 use crate::app::App;
+use crate::image::compare::LinearImage;
 use engine::Wake;
 use glam::UVec2;
 use std::time::Duration;
@@ -40,6 +43,8 @@ pub struct ViewOptions {
     pub size: UVec2,
     /// Name of the scene: screenshots are called `{screenshot_stem}_{n}.png`.
     pub screenshot_stem: String,
+    /// A picture to measure the true error by, of the view that the window opens with.
+    pub reference: Option<LinearImage>,
     /// Which keys do what.
     pub keys: keymap::Keymap,
     /// Closes the window by itself after this time.

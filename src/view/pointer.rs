@@ -1,7 +1,7 @@
 //! The mouse: buttons that drag, the wheel, and where the cursor is.
 
-use super::input::{Command, Drag};
-use super::keymap::Hold;
+use super::input::{Command, Drag, Press};
+use super::keymap::{Hold, Tap};
 use super::window::Viewer;
 use glam::DVec2;
 use std::time::Instant;
@@ -11,6 +11,9 @@ use winit::window::CursorGrabMode;
 
 /// Pixels of a touchpad that count as a notch of a wheel.
 const PIXELS_PER_NOTCH: f64 = 40.0;
+
+/// A button let go within so many pixels was not dragged.
+const CLICK: f64 = 4.0;
 
 impl Viewer {
     /// A button went down or up.
@@ -23,8 +26,16 @@ impl Viewer {
         };
         if down {
             self.begin_drag(drag);
-        } else if self.drag.is_some_and(|(current, _)| current == drag) {
+        } else if let Some((current, start)) = self.drag
+            && current == drag
+        {
             self.end_drag();
+            let way = DVec2::new(self.cursor.x - start.x, self.cursor.y - start.y);
+            if drag == Drag::Orbit && !self.dragged && way.length() < CLICK {
+                let shift = self.held[Hold::Fast as usize];
+                let press = Press { tap: Tap::Click, shift, cursor: self.cursor_in_picture() };
+                self.send(Command::Tap { press, at: Instant::now() });
+            }
         }
     }
 
@@ -34,6 +45,7 @@ impl Viewer {
             return;
         }
         self.drag = Some((drag, self.cursor));
+        self.dragged = false;
         if drag == Drag::Look {
             // X11 cannot lock the pointer: it is put back to the middle instead. Confining it as well
             // would deliver each of its motions twice.
@@ -54,12 +66,19 @@ impl Viewer {
     pub(super) fn cursor_moved(&mut self, to: PhysicalPosition<f64>) {
         let from = std::mem::replace(&mut self.cursor, to);
         self.cursor_inside = true;
-        let (Some((drag, _)), Some(screen)) = (self.drag, &self.screen) else {
+        let (Some((drag, start)), Some(screen)) = (self.drag, &self.screen) else {
             return;
         };
         if drag != Drag::Look {
             // The pointer is free: what counts is how far it came in the window.
             let pixels = DVec2::new(to.x - from.x, to.y - from.y);
+            // A hand that clicks shakes.
+            if drag == Drag::Orbit && !self.dragged {
+                self.dragged = DVec2::new(to.x - start.x, to.y - start.y).length() >= CLICK;
+                if !self.dragged {
+                    return;
+                }
+            }
             return self.send(Command::Drag { drag, pixels, at: Instant::now() });
         }
         let middle = screen.size().as_dvec2() / 2.0;

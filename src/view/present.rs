@@ -27,6 +27,7 @@ impl Viewer {
             self.asked = self.asked.or(published.asked.take());
         }
         self.moving = published.moving;
+        self.layer.clone_from(&published.layer);
         self.status.clone_from(&published.status);
     }
 
@@ -69,12 +70,16 @@ impl Viewer {
             keys: &self.options.keys,
             letters: &self.letters,
         };
-        let (ui, picture) = (&mut self.ui, &self.picture);
+        let (ui, picture, layer) = (&mut self.ui, &self.picture, &self.layer);
         let outcome = screen.draw(|bytes, size| {
             if picture.rgba.is_empty() {
                 bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
             } else {
                 screenshot::scale_into(&picture.rgba, picture.size, bytes, size);
+            }
+            // After a resize the old layer would lie beside what it is about.
+            if let Some(layer) = layer.as_ref().filter(|layer| layer.size == size && picture.size == size) {
+                layer.cover(bytes);
             }
             if !ui.is_bare(&content) {
                 ui.draw(bytes, size, scale_factor, &content);

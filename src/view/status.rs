@@ -1,7 +1,9 @@
 //! What the status says: names and values, without how they look.
 
 use super::controls::{filter_name, integrator_name, tone_map_name};
+use super::debug::DebugStatus;
 use super::instrument::Graph;
+use super::pixel_view::Legend;
 use crate::image::ToneMap;
 use crate::scene::Filter;
 use crate::trace::Integrator;
@@ -23,6 +25,10 @@ pub struct Status {
     pub noise: Option<(f64, f64)>,
     /// How it falls.
     pub graph: Arc<Graph>,
+    /// What the colours stand for, if it is not light.
+    pub legend: Option<Legend>,
+    /// What is drawn into the scene.
+    pub debug: DebugStatus,
     /// Rays of all kinds per second of tracing.
     pub rays_per_second: f64,
     /// Side of a preview pixel.
@@ -209,6 +215,8 @@ pub(super) mod tests {
             paused: false,
             noise: None,
             graph: Arc::default(),
+            legend: None,
+            debug: DebugStatus::default(),
             rays_per_second: 1.234_5e6,
             preview_scale: Some(4),
             resets: 3,

@@ -1,6 +1,7 @@
 //! The window's thread: events in, pictures out, never a wait.
 
 use super::chord::Letters;
+use super::debug::layer::Layer;
 use super::engine::{Engine, Published, Wake};
 use super::input::{Command, Drag};
 use super::keymap::Hold;
@@ -49,11 +50,14 @@ pub struct Viewer {
     pub(super) held: [bool; Hold::COUNT],
     /// What the mouse does, and where it began.
     pub(super) drag: Option<(Drag, PhysicalPosition<f64>)>,
+    /// Whether it has gone far enough to be no click.
+    pub(super) dragged: bool,
     pub(super) cursor: PhysicalPosition<f64>,
     pub(super) cursor_inside: bool,
     pub(super) letters: Letters,
     pub(super) visible: bool,
     pub(super) picture: Picture,
+    pub(super) layer: Option<Arc<Layer>>,
     pub(super) status: Option<Status>,
     pub(super) moving: bool,
     pub(super) asked: Option<Instant>,
@@ -111,11 +115,13 @@ impl Viewer {
             keys: HashSet::new(),
             held: [false; Hold::COUNT],
             drag: None,
+            dragged: false,
             cursor: PhysicalPosition::default(),
             cursor_inside: false,
             letters: Letters::default(),
             visible: true,
             picture: Picture::default(),
+            layer: None,
             status: None,
             moving: true,
             asked: None,
@@ -163,7 +169,9 @@ impl Viewer {
         let interrupt = Arc::new(AtomicBool::new(false));
         let published = Arc::new(Mutex::new(Published::default()));
         let proxy = self.proxy.clone();
+        let reference = self.options.reference.take();
         let engine = Engine {
+            reference,
             commands: receiver,
             interrupt: Arc::clone(&interrupt),
             published: Arc::clone(&published),

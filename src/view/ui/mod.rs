@@ -1,12 +1,15 @@
 //! Everything that is drawn over the picture: cards of text, the graph, the help.
 
+pub mod debug;
 pub mod graph;
 pub mod help;
+pub mod legend;
 pub mod paint;
 pub mod strip;
 pub mod style;
 
 use super::chord::Letters;
+use super::debug::DebugStatus;
 use super::keymap::Keymap;
 use super::status::{Level, Measured, Status};
 use egui::{Align2, Area, Context, Event, Id, Pos2, RawInput, Rect, RichText, ViewportId, vec2};
@@ -100,7 +103,9 @@ impl Ui {
     /// Whether there is nothing to draw, so that the picture needs no second look.
     #[must_use]
     pub fn is_bare(&self, content: &Content) -> bool {
-        let silent = content.notice.is_empty() && content.loading.is_none();
+        let silent = content.notice.is_empty()
+            && content.loading.is_none()
+            && content.status.is_none_or(|status| status.debug == DebugStatus::default());
         self.level == Level::None && !self.help && !self.graph && silent
     }
 
@@ -109,6 +114,10 @@ impl Ui {
             if self.level != Level::None {
                 strip::show(context, status, content.measured, self.level == Level::Long);
             }
+            if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None) {
+                legend::show(context, legend);
+            }
+            debug::show(context, &status.debug);
             if self.graph {
                 graph::show(context, &status.graph);
             }
