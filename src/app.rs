@@ -124,6 +124,7 @@ impl App {
         world.init_resource::<MaterialNumbers>();
         world.init_resource::<BlasCache>();
         world.init_resource::<Redone>();
+        world.init_resource::<sync::Entities>();
         world.add_schedule(frame_schedule());
         Self { world }
     }

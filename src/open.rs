@@ -6,7 +6,7 @@ use crate::image::develop::suggest_exposure;
 use crate::image::{Display, ToneMap};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform};
-use crate::sync::Instructions;
+use crate::sync::{Instructions, RenderOrigin};
 use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -122,6 +122,10 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     };
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);
+    app.world.insert_resource(SceneOrigin { source: source.clone(), options: options.clone() });
+    if let Some(origin) = report.render.origin {
+        app.world.insert_resource(RenderOrigin(Some(origin.into())));
+    }
     app.world.insert_resource(settings);
     app.world.insert_resource(Instructions(wishes.isa.unwrap_or_default()));
     app.world.insert_resource(Film::new(settings.size, wishes.first_sample.unwrap_or(0)));
@@ -148,6 +152,15 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     }
     let build_seconds = start.elapsed().as_secs_f64();
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
+}
+
+/// Where the scene in a world comes from, to load or to speak of it again.
+#[derive(Resource, Clone, Debug)]
+pub struct SceneOrigin {
+    /// The scene.
+    pub source: SceneSource,
+    /// How it was loaded.
+    pub options: LoadOptions,
 }
 
 /// The picture that the exposure is chosen by.

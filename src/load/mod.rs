@@ -17,7 +17,7 @@ mod gltf;
 mod obj;
 mod picture;
 mod report;
-mod settings;
+pub mod settings;
 mod source;
 
 pub use builtin::{BuiltIn, built_in_scenes};
@@ -120,6 +120,9 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     }
     for settings in &settings {
         settings.spawn_lights(sink)?;
+    }
+    for settings in &settings {
+        settings.apply_edits(sink)?;
     }
     for name in materials.unused() {
         let line =

@@ -42,6 +42,11 @@ impl<'w> Sink<'w> {
         entity
     }
 
+    /// Takes note of something that was spawned elsewhere.
+    pub(super) fn note_spawned(&mut self, entity: Entity) {
+        self.spawned.push(entity);
+    }
+
     /// Adds a warning, once.
     pub(super) fn warn(&mut self, line: String) {
         if self.report.warnings.contains(&line) {

@@ -6,14 +6,17 @@
 pub mod bounds;
 pub mod camera;
 pub mod color;
+pub mod hidden;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod path;
 pub mod texture;
 pub mod transform;
 
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Lens, Projection};
+pub use hidden::Hidden;
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, TextureUse};
 pub use mesh::{Instance, Mesh, TriangleMesh};

@@ -56,6 +56,15 @@ impl RenderOrigin {
     }
 }
 
+/// Which entities the flat arrays come from.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Entities {
+    /// Of each instance.
+    pub instances: Vec<Entity>,
+    /// Of each light that is not an emissive instance: those come first.
+    pub lights: Vec<Entity>,
+}
+
 /// What rays are traced with: the machine's widest, unless somebody wants another.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instructions(pub Isa);

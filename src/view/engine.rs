@@ -6,6 +6,7 @@ use super::cameras::{
 use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
 use super::debug::layer::Layer;
 use super::debug::{CurrentLayer, Debug, DebugLines, change_debug, draw_layer, explain_pinned};
+use super::edit::{Editor, edit_scene, finish_sync, start_sync};
 use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
 use super::input::{Command, Input};
 use super::instrument::{Instrument, Reference, note_noise};
@@ -19,7 +20,7 @@ use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
 use crate::image::compare::LinearImage;
 use crate::image::{Display, Picture};
 use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
-use crate::sync::{Redone, reset_film};
+use crate::sync::{Redone, build_blas, reset_film};
 use crate::trace::{Geometry, RenderSettings};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
@@ -233,6 +234,7 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<DepthWanted>();
     app.world.init_resource::<FirstHits>();
     app.world.init_resource::<Debug>();
+    app.world.init_resource::<Editor>();
     app.world.init_resource::<DebugLines>();
     app.world.init_resource::<CurrentLayer>();
     let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
@@ -249,12 +251,14 @@ fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             change_pause,
             (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
             (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
-            (remember, print_camera, choose_pixel_view, change_debug).chain(),
+            (remember, print_camera, choose_pixel_view, change_debug, edit_scene).chain(),
         )
             .chain()
             .in_set(FrameSystems::Input),
     );
     app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
+    app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
+    app.add_systems(finish_sync.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
 }
@@ -279,6 +283,7 @@ fn status(app: &App) -> Status {
         graph: Arc::clone(&world.resource::<Instrument>().graph),
         legend: world.resource::<CurrentLegend>().0.clone(),
         debug: world.resource::<Debug>().status(),
+        edit: world.resource::<Editor>().status(),
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         resets: world.resource::<Redone>().resets,

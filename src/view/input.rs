@@ -1,5 +1,6 @@
 //! What the user does, from the window's thread to the frame's systems.
 
+use super::edit::property::Property;
 use super::keymap::{Hold, Tap};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, UVec2};
@@ -37,6 +38,15 @@ pub enum Command {
     Tap {
         /// Which, and how.
         press: Press,
+        /// When the event arrived.
+        at: Instant,
+    },
+    /// A number of the selected thing is to be another.
+    Edit {
+        /// Which.
+        property: Property,
+        /// How much.
+        value: f64,
         /// When the event arrived.
         at: Instant,
     },
@@ -83,6 +93,24 @@ impl Tap {
             || matches!(self, Self::ResetCamera | Self::PreviousCamera | Self::NextCamera)
     }
 
+    /// Whether it is for the editor.
+    #[must_use]
+    pub fn edits(self) -> bool {
+        matches!(
+            self,
+            Self::Select
+                | Self::Escape
+                | Self::PreviousRow
+                | Self::NextRow
+                | Self::Less
+                | Self::More
+                | Self::Hide
+                | Self::Duplicate
+                | Self::Undo
+                | Self::SaveEdits
+        )
+    }
+
     /// Whether it changes the camera that the user flies, so that there must be one.
     #[must_use]
     pub fn changes_free_camera(self) -> bool {
@@ -116,6 +144,8 @@ pub struct Input {
     pub dolly: f64,
     /// Key presses.
     pub taps: Vec<Press>,
+    /// New values for the selected thing.
+    pub edits: Vec<(Property, f64)>,
     /// New size of the picture.
     pub resize: Option<UVec2>,
 }
@@ -132,6 +162,7 @@ impl Input {
             wheel: 0.0,
             dolly: 0.0,
             taps: Vec::new(),
+            edits: Vec::new(),
             resize: None,
         }
     }
@@ -156,6 +187,10 @@ impl Input {
             Command::Tap { press, at } => {
                 self.taps.push(press);
                 press.tap.moves_camera().then_some(at)
+            }
+            Command::Edit { property, value, at } => {
+                self.edits.push((property, value));
+                Some(at)
             }
             Command::Resize(size) => {
                 self.resize = Some(size);
@@ -184,6 +219,7 @@ impl Input {
         self.wheel = 0.0;
         self.dolly = 0.0;
         self.taps.clear();
+        self.edits.clear();
         self.resize = None;
     }
 

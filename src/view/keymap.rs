@@ -116,6 +116,24 @@ pub enum Tap {
     PreviousStep,
     /// Near first or priority queue.
     Order,
+    /// Edit what is under the cursor.
+    Select,
+    /// The number above.
+    PreviousRow,
+    /// The number below.
+    NextRow,
+    /// Less of it.
+    Less,
+    /// More of it.
+    More,
+    /// Leave it out of the picture, or not.
+    Hide,
+    /// Another one beside it.
+    Duplicate,
+    /// Take the last edit back.
+    Undo,
+    /// Keep the edits in a file.
+    SaveEdits,
     /// Next texture filter.
     Filter,
     /// Next integrator.
@@ -312,6 +330,30 @@ pub const TABLE: &[Section] = &[
                 ],
             ),
             row("order: near first, priority queue", &[tap("order", Tap::Order, &["O"])]),
+        ],
+    ),
+    (
+        "Editing",
+        &[
+            row("select what is under the cursor", &[tap("select", Tap::Select, &["M"])]),
+            row(
+                "number above, below",
+                &[
+                    again("previous_row", Tap::PreviousRow, &["Ctrl+ArrowUp"]),
+                    again("next_row", Tap::NextRow, &["Ctrl+ArrowDown"]),
+                ],
+            ),
+            row(
+                "less, more of it (Shift: ten times) *",
+                &[
+                    again("less", Tap::Less, &["Ctrl+ArrowLeft"]),
+                    again("more", Tap::More, &["Ctrl+ArrowRight"]),
+                ],
+            ),
+            row("hide, show *", &[tap("hide", Tap::Hide, &["Delete"])]),
+            row("duplicate *", &[tap("duplicate", Tap::Duplicate, &["Ctrl+D"])]),
+            row("undo *", &[again("undo", Tap::Undo, &["Backspace", "Ctrl+Z"])]),
+            row("save the edits as a settings file", &[tap("save_edits", Tap::SaveEdits, &["Ctrl+E"])]),
         ],
     ),
     (

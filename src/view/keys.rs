@@ -17,6 +17,11 @@ impl Viewer {
         if let (Key::Character(text), false, false) = (&event.logical_key, control, shift) {
             self.letters.learn(code, text);
         }
+        let pressed = event.state == ElementState::Pressed;
+        if pressed && self.ui.takes_text() {
+            self.ui.key(code, event.text.as_deref());
+            return self.redraw();
+        }
         if event.state == ElementState::Released {
             self.keys.remove(&code);
             return self.hold();
@@ -57,7 +62,7 @@ impl Viewer {
             Tap::HudLevel => self.ui.level = self.ui.level.next(),
             Tap::Graph => self.ui.graph = !self.ui.graph,
             Tap::Help => self.ui.help = !self.ui.help,
-            Tap::Escape => self.ui.help = false,
+            Tap::Escape if self.ui.help => self.ui.help = false,
             Tap::Quit => event_loop.exit(),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {

@@ -9,6 +9,7 @@ pub mod cameras;
 pub mod chord;
 pub mod controls;
 pub mod debug;
+pub mod edit;
 pub mod engine;
 pub mod flags;
 pub mod fly;

@@ -18,6 +18,9 @@ const CLICK: f64 = 4.0;
 impl Viewer {
     /// A button went down or up.
     pub(super) fn button(&mut self, button: MouseButton, down: bool) {
+        if self.ui.button(button, down) {
+            return self.redraw();
+        }
         let drag = match button {
             MouseButton::Right => Drag::Look,
             MouseButton::Left => Drag::Orbit,
@@ -66,6 +69,11 @@ impl Viewer {
     pub(super) fn cursor_moved(&mut self, to: PhysicalPosition<f64>) {
         let from = std::mem::replace(&mut self.cursor, to);
         self.cursor_inside = true;
+        let display =
+            self.screen.as_ref().map_or((1.0, glam::UVec2::ONE), |s| (s.window.scale_factor(), s.size()));
+        if self.ui.pointer(DVec2::new(to.x, to.y), display) {
+            self.redraw();
+        }
         let (Some((drag, start)), Some(screen)) = (self.drag, &self.screen) else {
             return;
         };

@@ -2,6 +2,7 @@
 
 use super::ViewError;
 use super::engine::{Wake, lock};
+use super::input::Command;
 use super::screen::Presented;
 use super::screenshot;
 use super::status::Measured;
@@ -86,6 +87,9 @@ impl Viewer {
             }
         });
         let now = Instant::now();
+        for (property, value) in std::mem::take(&mut self.ui.edits) {
+            self.send(Command::Edit { property, value, at: now });
+        }
         match outcome {
             Presented::Yes => self.was_presented(now),
             Presented::Later(pause) => self.due.redraw = Some(now + pause),

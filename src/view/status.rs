@@ -2,6 +2,7 @@
 
 use super::controls::{filter_name, integrator_name, tone_map_name};
 use super::debug::DebugStatus;
+use super::edit::EditStatus;
 use super::instrument::Graph;
 use super::pixel_view::Legend;
 use crate::image::ToneMap;
@@ -29,6 +30,8 @@ pub struct Status {
     pub legend: Option<Legend>,
     /// What is drawn into the scene.
     pub debug: DebugStatus,
+    /// What is selected.
+    pub edit: Option<Arc<EditStatus>>,
     /// Rays of all kinds per second of tracing.
     pub rays_per_second: f64,
     /// Side of a preview pixel.
@@ -217,6 +220,7 @@ pub(super) mod tests {
             graph: Arc::default(),
             legend: None,
             debug: DebugStatus::default(),
+            edit: None,
             rays_per_second: 1.234_5e6,
             preview_scale: Some(4),
             resets: 3,

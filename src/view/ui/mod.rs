@@ -1,6 +1,7 @@
 //! Everything that is drawn over the picture: cards of text, the graph, the help.
 
 pub mod debug;
+pub mod edit;
 pub mod graph;
 pub mod help;
 pub mod legend;
@@ -10,12 +11,18 @@ pub mod style;
 
 use super::chord::Letters;
 use super::debug::DebugStatus;
+use super::edit::property::Property;
 use super::keymap::Keymap;
 use super::status::{Level, Measured, Status};
-use egui::{Align2, Area, Context, Event, Id, Pos2, RawInput, Rect, RichText, ViewportId, vec2};
-use glam::UVec2;
+use egui::{
+    Align2, Area, Context, Event, Id, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, RichText,
+    ViewportId, pos2, vec2,
+};
+use glam::{DVec2, UVec2};
 use paint::Painter;
 use std::time::Instant;
+use winit::event::MouseButton;
+use winit::keyboard::KeyCode;
 
 /// What there is to show.
 pub struct Content<'a> {
@@ -44,6 +51,8 @@ pub struct Ui {
     context: Context,
     painter: Painter,
     events: Vec<Event>,
+    /// What the user has changed on a card.
+    pub edits: Vec<(Property, f64)>,
     start: Instant,
 }
 
@@ -59,6 +68,7 @@ impl Default for Ui {
             context,
             painter,
             events: Vec::new(),
+            edits: Vec::new(),
             start: Instant::now(),
         }
     }
@@ -100,16 +110,72 @@ impl Ui {
         self.painter.paint(rgba, size, &primitives, output.pixels_per_point);
     }
 
+    /// The cursor is at this pixel now. Whether a card wants to show that.
+    pub fn pointer(&mut self, at: DVec2, (display, size): (f64, UVec2)) -> bool {
+        let at = at.as_vec2() / scale_of(display, size);
+        self.events.push(Event::PointerMoved(pos2(at.x, at.y)));
+        self.context.is_pointer_over_area() && self.context.wants_pointer_input()
+    }
+
+    /// A mouse button. Whether it was meant for a card.
+    pub fn button(&mut self, button: MouseButton, pressed: bool) -> bool {
+        let pos = self.events.iter().rev().find_map(|event| match event {
+            Event::PointerMoved(pos) => Some(*pos),
+            _ => None,
+        });
+        let Some(pos) = pos.or(self.context.pointer_latest_pos()) else { return false };
+        let over = self.context.layer_id_at(pos).is_some_and(|layer| layer.order != egui::Order::Background);
+        if button != MouseButton::Left || !(over || self.context.is_using_pointer()) {
+            return false;
+        }
+        let button = PointerButton::Primary;
+        self.events.push(Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE });
+        true
+    }
+
+    /// Whether what is typed goes into a card.
+    #[must_use]
+    pub fn takes_text(&self) -> bool {
+        self.context.wants_keyboard_input()
+    }
+
+    /// Something is typed into a card.
+    pub fn key(&mut self, code: KeyCode, text: Option<&str>) {
+        let key = match code {
+            KeyCode::Enter | KeyCode::NumpadEnter => Some(Key::Enter),
+            KeyCode::Escape => Some(Key::Escape),
+            KeyCode::Backspace => Some(Key::Backspace),
+            KeyCode::Delete => Some(Key::Delete),
+            KeyCode::ArrowLeft => Some(Key::ArrowLeft),
+            KeyCode::ArrowRight => Some(Key::ArrowRight),
+            KeyCode::Tab => Some(Key::Tab),
+            _ => None,
+        };
+        match (key, text) {
+            (Some(key), _) => self.events.push(Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers: Modifiers::NONE,
+            }),
+            (None, Some(text)) => self.events.push(Event::Text(text.to_owned())),
+            (None, None) => {}
+        }
+    }
+
     /// Whether there is nothing to draw, so that the picture needs no second look.
     #[must_use]
     pub fn is_bare(&self, content: &Content) -> bool {
         let silent = content.notice.is_empty()
             && content.loading.is_none()
-            && content.status.is_none_or(|status| status.debug == DebugStatus::default());
+            && content
+                .status
+                .is_none_or(|status| status.debug == DebugStatus::default() && status.edit.is_none());
         self.level == Level::None && !self.help && !self.graph && silent
     }
 
-    fn show(&self, context: &Context, content: &Content) {
+    fn show(&mut self, context: &Context, content: &Content) {
         if let Some(status) = content.status {
             if self.level != Level::None {
                 strip::show(context, status, content.measured, self.level == Level::Long);
@@ -118,6 +184,9 @@ impl Ui {
                 legend::show(context, legend);
             }
             debug::show(context, &status.debug);
+            if let Some(edited) = &status.edit {
+                edit::show(context, edited, &mut self.edits);
+            }
             if self.graph {
                 graph::show(context, &status.graph);
             }
