@@ -1,6 +1,6 @@
 //! The `penumbra` command: arguments in, exit code out. The one place that prints.
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use penumbra::cli::{Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs};
 use penumbra::farm::{self, is_film};
@@ -36,7 +36,21 @@ mod exit {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let code = match cli.command {
-        Some(Command::Render(args)) => headless(&args.scene, &args.output),
+        Some(Command::Render(args)) => {
+            let output = args.output.clone();
+            match args.scene() {
+                Ok(scene) => headless(&scene, &output),
+                Err(error) => {
+                    eprintln!("error: {error}");
+                    exit::BAD_COMMAND_LINE
+                }
+            }
+        }
+        Some(Command::Completions(args)) => {
+            clap_complete::generate(args.shell, &mut Cli::command(), "penumbra", &mut std::io::stdout());
+            0
+        }
+        Some(Command::Man) => manual(),
         Some(Command::Compare(args)) => compare(&args),
         Some(Command::Merge(args)) => merge(&args),
         Some(Command::Report(args)) => report(&args),
@@ -50,6 +64,11 @@ fn main() -> ExitCode {
         None => window(&cli.window),
     };
     ExitCode::from(code)
+}
+
+/// Prints the manual page. Whoever closed standard output does not want to read it.
+fn manual() -> u8 {
+    u8::from(clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout()).is_err())
 }
 
 #[cfg(not(feature = "view"))]
@@ -76,6 +95,16 @@ fn window(args: &WindowArgs) -> u8 {
             return exit::BAD_COMMAND_LINE;
         }
     };
+    let replay = args.replay.as_deref().map(penumbra::view::replay::Replay::open).transpose();
+    let record = args.record.as_deref().map(penumbra::view::replay::Recorder::create).transpose();
+    let (replay, record) = match replay.and_then(|replay| Ok((replay, record?))) {
+        Ok(both) => both,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::BAD_COMMAND_LINE;
+        }
+    };
+    let replays = replay.is_some();
     let reference = match args.output.reference.as_deref().map(open_reference).transpose() {
         Ok(reference) => reference,
         Err(error) => {
@@ -90,6 +119,8 @@ fn window(args: &WindowArgs) -> u8 {
         screenshot_stem: source.name(),
         reference,
         keys,
+        replay,
+        record,
         exit_after: None,
     };
     let load = args.scene.load_options();
@@ -104,7 +135,12 @@ fn window(args: &WindowArgs) -> u8 {
         Err(error) => Err(error.to_string()),
     });
     match opened {
-        Ok(()) => 0,
+        Ok(response) => {
+            if replays {
+                println!("{}", response.json());
+            }
+            0
+        }
         Err(ViewError::NoDisplay(why)) => {
             eprintln!("no window: {why}; rendering to a picture instead");
             instead_of_window(args)

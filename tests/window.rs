@@ -632,3 +632,62 @@ fn a_pinned_pixel_shows_its_rays_and_boxes_show_the_hierarchy() {
     pause(500);
     assert!(difference(&plain, &desktop.shot(&program)) > 0.01, "a box around everything");
 }
+
+#[test]
+fn a_screenshot_is_made_again_from_what_it_says() {
+    let Some(desktop) = desktop("recipe") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.hide_status(&mut program);
+    for key in ["Home", "t", "t", "period"] {
+        desktop.xdotool(["key", key]);
+        pause(100);
+    }
+    desktop.wait_until_done(&mut program);
+    desktop.xdotool(["key", "ctrl+F12"]);
+    let shot = wait_for("the file", || pictures_in(&desktop.directory).first().cloned());
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+    let again = desktop.directory.join("again.png");
+    let mut render = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
+    let render = render.args(["render", "-q", "--from"]).arg(&shot).arg("-o").arg(&again);
+    assert!(render.status().unwrap().success());
+    let [shot, again] = [shot, again].map(|path| image::open(path).unwrap().to_rgb8());
+    assert!(colors(&shot) > 50);
+    assert_eq!(difference(&shot, &again), 0.0);
+}
+
+#[test]
+fn a_file_that_changes_is_loaded_again_with_the_camera_kept() {
+    let Some(desktop) = desktop("reload") else {
+        return;
+    };
+    let scene = "[[model]]\nfile = 'floor.obj'\n[[light]]\nkind = 'point'\nposition = [0, 3, 1]\n\
+                 intensity = [9, 9, 9]\n[camera]\nposition = [0, 2, 6]\ntarget = [0, 0, 0]\n";
+    let floor = "mtllib floor.mtl\nusemtl a\nv -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nf 1 4 3 2\n";
+    let write = |name: &str, text: &str| std::fs::write(desktop.directory.join(name), text).unwrap();
+    write("scene.toml", scene);
+    write("floor.obj", floor);
+    write("floor.mtl", "newmtl a\nKd 0.8 0.8 0.8\n");
+    let mut program = desktop.start(&["scene.toml", "--resolution", "320x240", "--spp", "4"]);
+    desktop.hide_status(&mut program);
+    let home = desktop.shot(&program);
+    desktop.xdotool(["key", "Home"]);
+    pause(300);
+    desktop.wait_until_done(&mut program);
+    let grey = desktop.shot(&program);
+    assert!(difference(&home, &grey) > 0.05, "the camera moves");
+    write("floor.mtl", "newmtl a\nKd 0.1 0.8 0.1\n");
+    wait_for("a green floor", || (green_and_red(&desktop.shot(&program)).0 > 1000).then_some(()));
+    // A broken file says so and changes nothing.
+    write("scene.toml", "[[model]]\nfile = 3\n");
+    pause(1500);
+    assert!(program.is_alive());
+    assert!(green_and_red(&desktop.shot(&program)).0 > 1000);
+    write("floor.mtl", "newmtl a\nKd 0.8 0.8 0.8\n");
+    write("scene.toml", scene);
+    pause(8000);
+    desktop.wait_until_done(&mut program);
+    assert_eq!(difference(&grey, &desktop.shot(&program)), 0.0, "the camera is where it was");
+}

@@ -4,6 +4,7 @@ mod values;
 
 use crate::bvh::Isa;
 use crate::image::ToneMap;
+use crate::image::recipe::read_arguments;
 use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
 use crate::report::{GivenReference, ReportJob};
@@ -46,6 +47,17 @@ pub enum Command {
     Merge(MergeArgs),
     /// Measure speed and error over time, and write tables, curves and a page
     Report(ReportArgs),
+    /// Print a script that completes commands in a shell: penumbra completions bash > FILE
+    Completions(CompletionsArgs),
+    /// Print the manual page: penumbra man > penumbra.1
+    Man,
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// Whose
+    pub shell: clap_complete::Shell,
 }
 
 /// Arguments of the window.
@@ -60,6 +72,12 @@ pub struct WindowArgs {
     /// Name the built-in scenes
     #[arg(long)]
     pub list_scenes: bool,
+    /// Do what this file says, as if a user did it, and print the times from events to pictures as JSON
+    #[arg(long, value_name = "FILE")]
+    pub replay: Option<PathBuf>,
+    /// Write down what the user does, for --replay
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    pub record: Option<PathBuf>,
     /// Keys of your own [default: penumbra/keys.toml in your folder of settings, such as ~/.config]
     #[arg(long, value_name = "FILE.toml")]
     pub keys: Option<PathBuf>,
@@ -68,6 +86,9 @@ pub struct WindowArgs {
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct RenderArgs {
+    /// Make this screenshot again: scene, camera and look are what it says
+    #[arg(long, value_name = "SHOT.png", conflicts_with = "scene")]
+    pub from: Option<PathBuf>,
     /// Scene and look.
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -77,7 +98,7 @@ pub struct RenderArgs {
 }
 
 /// Where a headless render goes and when it ends.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct OutputArgs {
     /// File to write: .png (developed), .exr (linear) or .film (to --resume or merge); may be given several
     /// times [default: SCENE.png, or nothing with --json]
@@ -302,6 +323,10 @@ pub enum ToneMapArg {
     Clip,
     /// Khronos PBR Neutral.
     Neutral,
+    /// AgX: bright colours fade to white.
+    Agx,
+    /// ACES, by its usual fit.
+    Aces,
 }
 
 impl IntegratorArg {
@@ -318,7 +343,34 @@ impl From<ToneMapArg> for ToneMap {
         match arg {
             ToneMapArg::Clip => Self::Clip,
             ToneMapArg::Neutral => Self::Neutral,
+            ToneMapArg::Agx => Self::AgX,
+            ToneMapArg::Aces => Self::Aces,
         }
+    }
+}
+
+/// The scene and the look that a picture's recipe says.
+#[derive(Debug, Parser)]
+struct RecipeArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+impl RenderArgs {
+    /// The scene and the look: those of `--from`, or those given.
+    ///
+    /// # Errors
+    /// If there is no such picture, or it doesn't say.
+    pub fn scene(self) -> Result<SceneArgs, String> {
+        let Some(path) = self.from else { return Ok(self.scene) };
+        let arguments = read_arguments(&path).map_err(|error| error.to_string())?;
+        let wrong = |error: clap::Error| {
+            let text = error.to_string();
+            let line = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+            format!("{}: its recipe is not for this version: {line}", path.display())
+        };
+        let arguments = std::iter::once("penumbra".to_owned()).chain(arguments);
+        Ok(RecipeArgs::try_parse_from(arguments).map_err(wrong)?.scene)
     }
 }
 

@@ -4,10 +4,12 @@ use super::flags::camera_flags;
 use super::input::Input;
 use super::keymap::Tap;
 use crate::image::develop::exposure_for;
-use crate::image::{Display, ToneMap};
+use crate::image::{Display, ToneMap, save};
+use crate::open::SceneOrigin;
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
 use crate::trace::{Film, Integrator, RenderSettings};
 use bevy_ecs::prelude::*;
+use std::path::PathBuf;
 
 /// Whether refinement rests. The view still follows the camera.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,10 +83,8 @@ pub fn change_display(
             Tap::Brighter => wanted.exposure = step_exposure(wanted.exposure, thirds),
             Tap::Darker => wanted.exposure = step_exposure(wanted.exposure, -thirds),
             Tap::ToneMap => {
-                wanted.tone_map = match wanted.tone_map {
-                    ToneMap::Clip => ToneMap::Neutral,
-                    ToneMap::Neutral => ToneMap::Clip,
-                };
+                wanted.tone_map = wanted.tone_map.stepped(press.shift);
+                notices.0.push(Notice::Text(format!("tone map: {}", tone_map_name(wanted.tone_map))));
             }
             _ => {}
         }
@@ -95,6 +95,29 @@ pub fn change_display(
 /// `exposure` moved by `thirds` of a stop, on the grid of thirds: three steps are one stop exactly.
 fn step_exposure(exposure: f32, thirds: f32) -> f32 {
     ((exposure * 3.0).round() + thirds).clamp(-90.0, 90.0) / 3.0
+}
+
+/// Saves the film, linear and as it is shown.
+pub fn save_picture(
+    input: Res<Input>,
+    film: Res<Film>,
+    display: Res<Display>,
+    origin: Option<Res<SceneOrigin>>,
+    mut notices: ResMut<Notices>,
+) {
+    if input.count(Tap::SavePicture) == 0 {
+        return;
+    }
+    let stem = origin.map_or_else(|| "scene".to_owned(), |origin| origin.source.name());
+    let name = |n: u32, ending: &str| PathBuf::from(format!("{stem}_{n}.{ending}"));
+    let free = |n: &u32| !name(*n, "exr").exists() && !name(*n, "png").exists();
+    let n = (1..u32::MAX).find(free).unwrap_or(u32::MAX);
+    let saved = ["exr", "png"].map(|ending| save(&name(n, ending), &film, &display));
+    let said = match saved.into_iter().find_map(Result::err) {
+        None => format!("saved {stem}_{n}.exr and .png"),
+        Some(error) => format!("not saved: {error}"),
+    };
+    notices.0.push(Notice::Text(said));
 }
 
 /// Pause and resume.
@@ -141,7 +164,9 @@ pub fn integrator_name(integrator: Integrator) -> &'static str {
 pub fn tone_map_name(tone_map: ToneMap) -> &'static str {
     match tone_map {
         ToneMap::Clip => "clip",
-        ToneMap::Neutral => "neutral",
+        ToneMap::Neutral => "Khronos neutral",
+        ToneMap::AgX => "AgX",
+        ToneMap::Aces => "ACES",
     }
 }
 

@@ -1,33 +1,27 @@
 //! The thread that owns the [`App`] and runs its frames, so that the window never waits for a ray.
 
-use super::cameras::{
-    Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
-};
-use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
+use super::controls::{Notice, Notices, Paused};
+use super::debug::CurrentLayer;
 use super::debug::layer::Layer;
-use super::debug::{CurrentLayer, Debug, DebugLines, change_debug, draw_layer, explain_pinned};
-use super::edit::{Editor, edit_scene, finish_sync, start_sync};
-use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
 use super::input::{Command, Input};
-use super::instrument::{Instrument, Reference, note_noise};
-use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
-use super::pixel_view::{
-    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_pixel_view, develop_pixel_view,
-    refine_first_hits,
-};
+use super::instrument::{Instrument, Reference};
+use super::keymap::Tap;
+use super::prepare::{prepare, status};
+use super::reload::{load_again, open_other};
 use super::status::Status;
-use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
+use super::watch::{PAUSE, SceneWatch};
+use crate::app::{App, FrameBudget, FrameStats};
 use crate::image::compare::LinearImage;
+use crate::image::develop::develop_image;
 use crate::image::{Display, Picture};
-use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
-use crate::sync::{Redone, build_blas, reset_film};
-use crate::trace::{Geometry, RenderSettings};
+use crate::load::SceneSource;
+use crate::open::SceneOrigin;
+use crate::sync::Redone;
 use bevy_ecs::prelude::*;
-use bevy_ecs::system::RunSystemOnce;
-use glam::DVec3;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -38,15 +32,12 @@ const RESTING: std::ops::RangeInclusive<Duration> = Duration::from_millis(30)..=
 /// The longer the view rests, the rarer the pictures: this share of the time since it changed.
 const RESTING_SHARE: f64 = 0.1;
 
-/// Speed at the start, in radii of the scene per second.
-const RADII_PER_SECOND: f64 = 0.5;
-
 /// Whether there is something left to do although all samples are there. Set by systems, lowered before each frame.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending(pub bool);
 
 /// What the engine tells the window's thread to look at.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum Wake {
     /// [`Published`] has news.
     FrameReady,
@@ -56,6 +47,12 @@ pub enum Wake {
     Crashed(String),
     /// Something to show to the user.
     Notice(String),
+    /// Something to show, and to be pasted elsewhere.
+    Copy(String),
+    /// Another scene is shown now, of this name.
+    Opened(String),
+    /// The reference, developed, to compare with.
+    Reference(Picture),
 }
 
 /// The latest that the engine made; what the window has not taken is overwritten.
@@ -81,6 +78,8 @@ pub struct Engine<W> {
     pub reference: Option<LinearImage>,
     /// From the window.
     pub commands: Receiver<Command>,
+    /// To the engine itself, from whoever watches files for it.
+    pub own: Sender<Command>,
     /// Raised by the window after a command.
     pub interrupt: Arc<AtomicBool>,
     /// To the window.
@@ -100,9 +99,13 @@ impl<W: Fn(Wake)> Engine<W> {
         // A bug in a frame must end in a message, not in a window that never changes again.
         let outcome = catch_unwind(AssertUnwindSafe(|| match open() {
             Ok(mut app) => {
-                let reference = self.reference.take().map(Reference::new);
-                app.world.insert_resource(Instrument::against(reference));
-                self.run_frames(&mut app);
+                let reference = self.reference.take();
+                if let Some(image) = &reference {
+                    let rgba = develop_image(image, app.world.resource::<Display>());
+                    (self.wake)(Wake::Reference(Picture { size: image.size, rgba, version: 0 }));
+                }
+                app.world.insert_resource(Instrument::against(reference.map(Reference::new)));
+                self.run_frames(app);
             }
             Err(why) => (self.wake)(Wake::OpenFailed(why)),
         }));
@@ -111,27 +114,46 @@ impl<W: Fn(Wake)> Engine<W> {
         }
     }
 
-    fn run_frames(&self, app: &mut App) {
-        prepare(app, &self.interrupt);
+    fn run_frames(&self, mut app: App) {
+        prepare(&mut app, &self.interrupt);
+        let mut files = self.watch(&app);
         let mut view_changed_at = Instant::now();
         let mut idle = false;
         loop {
             let mut asked = None;
+            let mut commands = Vec::new();
             if idle {
-                // No CPU at all until the user does something.
-                match self.commands.recv() {
-                    Ok(Command::Quit) | Err(_) => return,
-                    Ok(command) => note(app, &command, &mut asked),
+                // No CPU at all until the user does something, or files do.
+                match files.wait(&self.commands) {
+                    Ok(command) => commands.push(command),
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return,
                 }
             }
             // Lowered before the commands are read: one that comes later raises it again.
             self.interrupt.store(false, Ordering::SeqCst);
-            for command in self.commands.try_iter() {
-                if matches!(command, Command::Quit) {
-                    return;
+            commands.extend(self.commands.try_iter());
+            let mut wanted = None;
+            for command in commands {
+                match command {
+                    Command::Quit => return,
+                    Command::Open(path) => wanted = Some(Some(path)),
+                    Command::FilesChanged => files.look(),
+                    Command::Tap { press, .. } if press.tap == Tap::Reload => wanted = Some(None),
+                    command => note(&mut app, &command, &mut asked),
                 }
-                note(app, &command, &mut asked);
             }
+            if files.is_time() {
+                wanted = wanted.or(Some(None));
+            }
+            if let Some(path) = wanted
+                && let Some(other) = self.replaced(&mut app, path)
+            {
+                app = other;
+                prepare(&mut app, &self.interrupt);
+                files = self.watch(&app);
+            }
+            let app = &mut app;
             let now = Instant::now();
             let mut input = app.world.resource_mut::<Input>();
             input.hold_until(now);
@@ -163,6 +185,47 @@ impl<W: Fn(Wake)> Engine<W> {
             self.say(app);
             self.publish(app, version, moving, asked);
         }
+    }
+
+    /// The scene loaded again, or that of `path` in its place; `None`, and a notice, if that cannot be.
+    fn replaced(&self, app: &mut App, path: Option<PathBuf>) -> Option<App> {
+        let start = Instant::now();
+        let again = path.is_none();
+        let loaded = match path {
+            Some(path) => open_other(app, &path),
+            None => load_again(app),
+        };
+        match loaded {
+            Ok(other) => {
+                let name =
+                    other.world.get_resource::<SceneOrigin>().map_or_else(String::new, |o| o.source.name());
+                let (verb, seconds) =
+                    (if again { "reloaded" } else { "opened" }, start.elapsed().as_secs_f64());
+                (self.wake)(Wake::Notice(format!("{verb} {name} in {seconds:.2} s")));
+                (self.wake)(Wake::Opened(name));
+                Some(other)
+            }
+            Err(why) => {
+                (self.wake)(Wake::Notice(format!("still the old scene: {why}")));
+                None
+            }
+        }
+    }
+
+    fn watch(&self, app: &App) -> Files {
+        let origin = app.world.get_resource::<SceneOrigin>();
+        let watch = origin.and_then(|origin| match &origin.source {
+            SceneSource::BuiltIn(_) => None,
+            SceneSource::File(path) => {
+                let (own, interrupt) = (self.own.clone(), Arc::clone(&self.interrupt));
+                Some(SceneWatch::new(path, move || {
+                    // An engine that has ended does not care.
+                    let _ = own.send(Command::FilesChanged);
+                    interrupt.store(true, Ordering::SeqCst);
+                }))
+            }
+        });
+        Files { watch, due: None }
     }
 
     /// Hands over what is new.
@@ -200,103 +263,50 @@ impl<W: Fn(Wake)> Engine<W> {
     /// Passes the frame's notices on.
     fn say(&self, app: &mut App) {
         for notice in std::mem::take(&mut app.world.resource_mut::<Notices>().0) {
-            let text = match notice {
-                Notice::Text(text) => text,
+            (self.wake)(match notice {
+                Notice::Text(text) => Wake::Notice(text),
                 Notice::Print(text) => {
                     use std::io::Write;
                     // Whoever closed standard output does not want to read it.
                     let _ = writeln!(std::io::stdout(), "{text}");
-                    text
+                    Wake::Copy(text)
                 }
-            };
-            (self.wake)(Wake::Notice(text));
+            });
         }
     }
 }
 
-/// Adds the window's resources and systems.
-fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
-    let mut budget = app.world.resource_mut::<FrameBudget>();
-    budget.interrupt = Arc::clone(interrupt);
-    (budget.preview, budget.develop) = (true, true);
-    // The camera may be asked for its place before the first frame has run.
-    let propagated = app.world.run_system_once(propagate_transforms);
-    debug_assert!(propagated.is_ok());
-    let camera = app.world.resource::<ActiveCamera>().0;
-    app.world.insert_resource(FileCameras { home: camera, last: camera });
-    app.world.insert_resource(Input::new(Instant::now()));
-    app.world.init_resource::<Paused>();
-    app.world.init_resource::<Notices>();
-    app.world.init_resource::<Bookmarks>();
-    app.world.init_resource::<Pending>();
-    app.world.init_resource::<PixelView>();
-    app.world.init_resource::<CurrentLegend>();
-    app.world.init_resource::<DepthWanted>();
-    app.world.init_resource::<FirstHits>();
-    app.world.init_resource::<Debug>();
-    app.world.init_resource::<Editor>();
-    app.world.init_resource::<DebugLines>();
-    app.world.init_resource::<CurrentLayer>();
-    let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
-    let vertical_fov = std::f32::consts::FRAC_PI_4;
-    app.world.insert_resource(Navigation { orbiting: false, pivot, vertical_fov });
-    if !app.world.contains_resource::<FlySpeed>() {
-        let radius = app.world.get_resource::<SceneBounds>().map_or(2.0, |bounds| bounds.radius);
-        app.world.insert_resource(FlySpeed(RADII_PER_SECOND * radius));
+/// The files of the scene, and when it is to be loaded again for them.
+struct Files {
+    watch: Option<SceneWatch>,
+    due: Option<Instant>,
+}
+
+impl Files {
+    /// Something happened in their folders.
+    fn look(&mut self) {
+        if self.watch.as_mut().is_some_and(SceneWatch::has_changed) {
+            self.due = Some(Instant::now() + PAUSE);
+        }
     }
-    app.add_systems(
-        (
-            change_settings,
-            change_display,
-            change_pause,
-            (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
-            (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
-            (remember, print_camera, choose_pixel_view, change_debug, edit_scene).chain(),
-        )
-            .chain()
-            .in_set(FrameSystems::Input),
-    );
-    app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
-    app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
-    app.add_systems(finish_sync.in_set(FrameSystems::Sync).after(reset_film));
-    app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
-    app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
+
+    fn is_time(&mut self) -> bool {
+        self.due.take_if(|due| *due <= Instant::now()).is_some()
+    }
+
+    /// The next command, or until it is time.
+    fn wait(&self, commands: &Receiver<Command>) -> Result<Command, RecvTimeoutError> {
+        match self.due {
+            Some(due) => commands.recv_timeout(due.saturating_duration_since(Instant::now())),
+            None => commands.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        }
+    }
 }
 
 /// Applies `command`; the first question for another view is remembered in `asked`.
 fn note(app: &mut App, command: &Command, asked: &mut Option<Instant>) {
     let at = app.world.resource_mut::<Input>().apply(command);
     *asked = asked.or(at);
-}
-
-fn status(app: &App) -> Status {
-    let world = &app.world;
-    let stats = world.resource::<FrameStats>();
-    let settings = world.resource::<RenderSettings>();
-    let display = world.resource::<Display>();
-    Status {
-        samples_per_pixel: stats.samples_per_pixel,
-        sample_target: world.resource::<FrameBudget>().sample_target,
-        done: stats.done,
-        paused: world.resource::<Paused>().0,
-        noise: stats.noise.map(|noise| (noise, stats.noise_doubt)),
-        graph: Arc::clone(&world.resource::<Instrument>().graph),
-        legend: world.resource::<CurrentLegend>().0.clone(),
-        debug: world.resource::<Debug>().status(),
-        edit: world.resource::<Editor>().status(),
-        rays_per_second: stats.rays_per_second,
-        preview_scale: stats.preview_scale,
-        resets: world.resource::<Redone>().resets,
-        dropped: stats.dropped,
-        exposure: display.exposure,
-        tone_map: display.tone_map,
-        speed: world.resource::<FlySpeed>().0,
-        orbiting: world.resource::<Navigation>().orbiting,
-        size: settings.size,
-        integrator: settings.integrator,
-        filter: settings.filter,
-        isa: world.resource::<Geometry>().tlas.isa().name(),
-    }
 }
 
 /// The text of a caught panic.

@@ -4,6 +4,7 @@ use super::edit::property::Property;
 use super::keymap::{Hold, Tap};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, UVec2};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// From the window to the engine.
@@ -50,6 +51,10 @@ pub enum Command {
         /// When the event arrived.
         at: Instant,
     },
+    /// Show this scene instead.
+    Open(PathBuf),
+    /// A file of the scene may have changed.
+    FilesChanged,
     /// The window's inside has this many pixels, each side at least 1.
     Resize(UVec2),
     /// End the engine.
@@ -196,7 +201,7 @@ impl Input {
                 self.resize = Some(size);
                 None
             }
-            Command::Quit => None,
+            Command::Open(_) | Command::FilesChanged | Command::Quit => None,
         }
     }
 

@@ -85,6 +85,12 @@ pub struct Instrument {
 }
 
 impl Instrument {
+    /// The same for another world, whose counts begin anew.
+    #[must_use]
+    pub fn moved(self) -> Self {
+        Self { resets: u64::MAX, ..self }
+    }
+
     /// One that measures the true error, if there is a reference.
     #[must_use]
     pub fn against(reference: Option<Reference>) -> Self {

@@ -32,6 +32,8 @@ pub enum Hold {
     Fast,
     /// Move slower.
     Slow,
+    /// Show the kept picture.
+    Compare,
     /// The other meaning of another key.
     Control,
 }
@@ -150,6 +152,12 @@ pub enum Tap {
     ScreenshotWithHud,
     /// Save the picture alone.
     Screenshot,
+    /// Save all that is known of the picture, linear and developed.
+    SavePicture,
+    /// Load the scene again.
+    Reload,
+    /// Keep the picture to compare with.
+    Keep,
     /// Close what is open.
     Escape,
     /// End the program.
@@ -306,6 +314,8 @@ pub const TABLE: &[Section] = &[
                 "show noise, samples, boxes, triangles, normals ... (Shift: back)",
                 &[tap("pixel_view", Tap::PixelView, &["V"])],
             ),
+            row("hold: the kept picture, or the reference", &[hold("compare", Hold::Compare, &["K"])]),
+            row("keep this picture to compare with", &[tap("keep", Tap::Keep, &["Ctrl+K"])]),
             row("texture filter: file's, nearest, bilinear *", &[tap("filter", Tap::Filter, &["N"])]),
             row("direct light / global illumination *", &[tap("integrator", Tap::Integrator, &["I"])]),
         ],
@@ -370,6 +380,8 @@ pub const TABLE: &[Section] = &[
                     tap("screenshot_picture", Tap::Screenshot, &["Ctrl+F12"]),
                 ],
             ),
+            row("save the picture as .exr and .png", &[tap("save", Tap::SavePicture, &["Ctrl+S"])]),
+            row("load the scene again (it is when a file changes)", &[tap("reload", Tap::Reload, &["F5"])]),
             row("close what is open", &[tap("escape", Tap::Escape, &["Escape"])]),
             row("quit", &[tap("quit", Tap::Quit, &["Ctrl+Q"])]),
         ],

@@ -2,30 +2,47 @@
 
 use super::input::{Command, Press};
 use super::keymap::{Action, Hold, Tap, is_modifier};
+use super::replay::Event;
 use super::window::Viewer;
 use std::time::Instant;
 use winit::event::{ElementState, KeyEvent};
 use winit::event_loop::ActiveEventLoop;
-use winit::keyboard::{Key, PhysicalKey};
+use winit::keyboard::{Key, KeyCode, PhysicalKey};
 
 impl Viewer {
     pub(super) fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent, is_synthetic: bool) {
         let PhysicalKey::Code(code) = event.physical_key else {
             return;
         };
-        let [control, shift] = [Hold::Control, Hold::Fast].map(|hold| self.held[hold as usize]);
-        if let (Key::Character(text), false, false) = (&event.logical_key, control, shift) {
-            self.letters.learn(code, text);
-        }
         let pressed = event.state == ElementState::Pressed;
         if pressed && self.ui.takes_text() {
             self.ui.key(code, event.text.as_deref());
             return self.redraw();
         }
-        if event.state == ElementState::Released {
+        let modified = self.held[Hold::Control as usize] || self.held[Hold::Fast as usize];
+        if let (Key::Character(text), false) = (&event.logical_key, modified) {
+            self.letters.learn(code, text);
+        }
+        if !event.repeat {
+            self.record(Event::Key(code, pressed));
+        }
+        self.key_moved(event_loop, code, pressed, event.repeat, is_synthetic);
+    }
+
+    /// A key went down or up, or is down for long.
+    pub(super) fn key_moved(
+        &mut self,
+        event_loop: &ActiveEventLoop,
+        code: KeyCode,
+        pressed: bool,
+        repeat: bool,
+        is_synthetic: bool,
+    ) {
+        if !pressed {
             self.keys.remove(&code);
             return self.hold();
         }
+        let [control, shift] = [Hold::Control, Hold::Fast].map(|hold| self.held[hold as usize]);
         let Some(entry) = self.options.keys.lookup(code, control, shift) else {
             return;
         };
@@ -36,7 +53,7 @@ impl Viewer {
                 self.keys.insert(code);
                 self.hold();
             }
-            Action::Tap(_) if event.repeat && !entry.repeats => {}
+            Action::Tap(_) if repeat && !entry.repeats => {}
             Action::Tap(tap) => self.tap(event_loop, tap),
         }
     }
@@ -54,6 +71,7 @@ impl Viewer {
         if held != self.held {
             self.held = held;
             self.send(Command::Held { held, at: Instant::now() });
+            self.redraw();
         }
     }
 
@@ -64,6 +82,7 @@ impl Viewer {
             Tap::Help => self.ui.help = !self.ui.help,
             Tap::Escape if self.ui.help => self.ui.help = false,
             Tap::Quit => event_loop.exit(),
+            Tap::Keep => self.keep_picture(),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {
                     screen.toggle_full_screen();

@@ -2,11 +2,13 @@
 
 use super::input::{Command, Drag, Press};
 use super::keymap::{Hold, Tap};
+use super::replay::{Event, Replay};
 use super::window::Viewer;
 use glam::DVec2;
 use std::time::Instant;
 use winit::dpi::PhysicalPosition;
 use winit::event::{MouseButton, MouseScrollDelta};
+use winit::event_loop::ActiveEventLoop;
 use winit::window::CursorGrabMode;
 
 /// Pixels of a touchpad that count as a notch of a wheel.
@@ -87,7 +89,7 @@ impl Viewer {
                     return;
                 }
             }
-            return self.send(Command::Drag { drag, pixels, at: Instant::now() });
+            return self.drag_by(drag, pixels);
         }
         let middle = screen.size().as_dvec2() / 2.0;
         let off = (DVec2::new(to.x, to.y) - middle).abs();
@@ -100,7 +102,37 @@ impl Viewer {
     /// The mouse itself moved, wherever the cursor is.
     pub(super) fn mouse_moved(&mut self, pixels: DVec2) {
         if let Some((Drag::Look, _)) = self.drag {
-            self.send(Command::Drag { drag: Drag::Look, pixels, at: Instant::now() });
+            self.drag_by(Drag::Look, pixels);
+        }
+    }
+
+    fn drag_by(&mut self, drag: Drag, pixels: DVec2) {
+        self.record(Event::Drag(drag, pixels.x, pixels.y));
+        self.send(Command::Drag { drag, pixels, at: Instant::now() });
+    }
+
+    /// Does again what was recorded, as far as its time has come.
+    pub(super) fn replay(&mut self, event_loop: &ActiveEventLoop, now: Instant) {
+        // Not before there is something to see.
+        let Some(replay) = self.options.replay.as_mut().filter(|_| !self.picture.rgba.is_empty()) else {
+            return;
+        };
+        for event in replay.due(now) {
+            match event {
+                Event::Key(code, pressed) => self.key_moved(event_loop, code, pressed, false, false),
+                Event::Drag(drag, x, y) => {
+                    self.send(Command::Drag { drag, pixels: DVec2::new(x, y), at: Instant::now() });
+                }
+                Event::Wheel(notches) => self.turn_wheel(notches),
+                Event::Quit => event_loop.exit(),
+            }
+        }
+        self.due.replay = self.options.replay.as_ref().and_then(Replay::next);
+    }
+
+    pub(super) fn record(&mut self, event: Event) {
+        if let Some(recorder) = &mut self.options.record {
+            recorder.note(event);
         }
     }
 
@@ -109,6 +141,11 @@ impl Viewer {
             MouseScrollDelta::LineDelta(_, y) => f64::from(y),
             MouseScrollDelta::PixelDelta(p) => p.y / PIXELS_PER_NOTCH,
         };
+        self.record(Event::Wheel(notches));
+        self.turn_wheel(notches);
+    }
+
+    fn turn_wheel(&mut self, notches: f64) {
         let dolly = self.held[Hold::Control as usize];
         self.send(Command::Wheel { notches, dolly, at: Instant::now() });
     }

@@ -3,6 +3,7 @@
 use super::ViewError;
 use super::engine::{Wake, lock};
 use super::input::Command;
+use super::keymap::Hold;
 use super::screen::Presented;
 use super::screenshot;
 use super::status::Measured;
@@ -71,7 +72,9 @@ impl Viewer {
             keys: &self.options.keys,
             letters: &self.letters,
         };
-        let (ui, picture, layer) = (&mut self.ui, &self.picture, &self.layer);
+        let compare = self.held[Hold::Compare as usize];
+        let picture = self.kept.as_ref().filter(|_| compare).unwrap_or(&self.picture);
+        let (ui, layer) = (&mut self.ui, self.layer.as_ref().filter(|_| !compare));
         let outcome = screen.draw(|bytes, size| {
             if picture.rgba.is_empty() {
                 bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
@@ -99,8 +102,11 @@ impl Viewer {
 
     pub(super) fn was_presented(&mut self, now: Instant) {
         self.presented.push_back(now);
+        self.response.pictures += 1;
+        self.longest_pause(now);
         if let Some(asked) = self.asked.take() {
             self.latencies.push_back(now - asked);
+            self.response.latencies.push(now - asked);
             if self.latencies.len() > LATENCIES {
                 self.latencies.pop_front();
             }
@@ -125,6 +131,22 @@ impl Viewer {
         }
     }
 
+    /// While the view changes, pictures are counted by the time between them.
+    fn longest_pause(&mut self, now: Instant) {
+        let before = self.presented.iter().rev().nth(1).copied();
+        if let (true, Some(before)) = (self.moving, before) {
+            self.response.moving_pictures += 1;
+            self.response.moving_time += now - before;
+        }
+    }
+
+    /// Sorted, for the end.
+    pub(super) fn measured_response(&self) -> super::Response {
+        let mut response = self.response.clone();
+        response.latencies.sort_unstable();
+        response
+    }
+
     pub(super) fn measured(&mut self) -> Measured {
         let now = Instant::now();
         while self.presented.front().is_some_and(|&at| now - at > Duration::from_secs(1))
@@ -146,6 +168,12 @@ impl Viewer {
         Measured { pictures_per_second, latency }
     }
 
+    /// Remembers what is seen now.
+    pub(super) fn keep_picture(&mut self) {
+        self.kept = Some(self.picture.clone());
+        self.say("kept: hold K to see it".to_owned());
+    }
+
     /// Writes a file on a thread of its own.
     pub(super) fn save_screenshot(&mut self, with_hud: bool) {
         let Some(screen) = &self.screen else { return };
@@ -161,9 +189,10 @@ impl Viewer {
             bytes
         };
         let stem = self.options.screenshot_stem.clone();
+        let recipe = self.status.as_ref().map_or_else(Default::default, |status| status.recipe.clone());
         let proxy = self.proxy.clone();
         let writer = std::thread::spawn(move || {
-            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem) {
+            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe) {
                 Ok(path) => format!("saved {}", path.display()),
                 Err(why) => format!("no screenshot: {why}"),
             };

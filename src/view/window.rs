@@ -8,7 +8,7 @@ use super::keymap::Hold;
 use super::screen::{Screen, vector};
 use super::status::Status;
 use super::ui::Ui;
-use super::{ViewError, ViewOptions};
+use super::{Response, ViewError, ViewOptions};
 use crate::app::App;
 use crate::image::Picture;
 use glam::{DVec2, UVec2};
@@ -57,16 +57,22 @@ pub struct Viewer {
     pub(super) letters: Letters,
     pub(super) visible: bool,
     pub(super) picture: Picture,
+    /// To compare with.
+    pub(super) kept: Option<Picture>,
     pub(super) layer: Option<Arc<Layer>>,
     pub(super) status: Option<Status>,
     pub(super) moving: bool,
     pub(super) asked: Option<Instant>,
     pub(super) ui: Ui,
     pub(super) notice: String,
+    /// What was copied is there as long as this is.
+    clipboard: Option<arboard::Clipboard>,
     pub(super) title: String,
     pub(super) titled_at: Option<Instant>,
     pub(super) presented: VecDeque<Instant>,
     pub(super) latencies: VecDeque<Duration>,
+    /// All of them, and pictures in all, for who asks at the end.
+    pub(super) response: Response,
     pub(super) resizing: Option<(UVec2, Instant)>,
     pub(super) due: Due,
     pub(super) writers: Vec<JoinHandle<()>>,
@@ -76,6 +82,7 @@ pub struct Viewer {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Due {
     pub(super) redraw: Option<Instant>,
+    pub(super) replay: Option<Instant>,
     pub(super) resize: Option<Instant>,
     pub(super) notice: Option<Instant>,
     pub(super) exit: Option<Instant>,
@@ -83,7 +90,7 @@ pub(super) struct Due {
 
 impl Due {
     fn next(self) -> Option<Instant> {
-        [self.redraw, self.resize, self.notice, self.exit].into_iter().flatten().min()
+        [self.redraw, self.replay, self.resize, self.notice, self.exit].into_iter().flatten().min()
     }
 }
 
@@ -121,16 +128,19 @@ impl Viewer {
             letters: Letters::default(),
             visible: true,
             picture: Picture::default(),
+            kept: None,
             layer: None,
             status: None,
             moving: true,
             asked: None,
             ui: Ui::default(),
             notice: String::new(),
+            clipboard: None,
             title: String::new(),
             titled_at: None,
             presented: VecDeque::new(),
             latencies: VecDeque::new(),
+            response: Response::default(),
             resizing: None,
             due: Due::default(),
             writers: Vec::new(),
@@ -141,12 +151,13 @@ impl Viewer {
     ///
     /// # Errors
     /// What ended the window, if it was not the user.
-    pub fn finish(self) -> Result<(), ViewError> {
-        for writer in self.writers {
+    pub fn finish(mut self) -> Result<Response, ViewError> {
+        self.response = self.measured_response();
+        for writer in std::mem::take(&mut self.writers) {
             // It said itself what it could not write.
             let _ = writer.join();
         }
-        if let Some(engine) = self.engine {
+        if let Some(engine) = self.engine.take() {
             let _ = engine.commands.send(Command::Quit);
             engine.interrupt.store(true, Ordering::SeqCst);
             // A scene that still loads cannot be interrupted, and has nothing to tidy up.
@@ -154,7 +165,7 @@ impl Viewer {
                 let _: Result<Infallible, RecvTimeoutError> = engine.ended.recv_timeout(FAREWELL);
             }
         }
-        self.failure.map_or(Ok(()), Err)
+        self.failure.map_or(Ok(self.response), Err)
     }
 
     pub(super) fn fail(&mut self, event_loop: &ActiveEventLoop, error: ViewError) {
@@ -173,6 +184,7 @@ impl Viewer {
         let engine = Engine {
             reference,
             commands: receiver,
+            own: commands.clone(),
             interrupt: Arc::clone(&interrupt),
             published: Arc::clone(&published),
             // The event loop is gone: so is who would look.
@@ -196,6 +208,16 @@ impl Viewer {
             let _ = engine.commands.send(command);
             engine.interrupt.store(true, Ordering::SeqCst);
         }
+    }
+
+    /// Puts `text` on the clipboard, and says so.
+    fn copy(&mut self, text: String) {
+        if self.clipboard.is_none() {
+            self.clipboard = arboard::Clipboard::new().ok();
+        }
+        let copied =
+            self.clipboard.as_mut().is_some_and(|clipboard| clipboard.set_text(text.clone()).is_ok());
+        self.say(if copied { format!("copied: {text}") } else { text });
     }
 
     pub(super) fn say(&mut self, text: String) {
@@ -246,9 +268,19 @@ impl ApplicationHandler<Wake> for Viewer {
         match wake {
             Wake::FrameReady => {
                 self.take_published();
+                if let Some(recorder) = &mut self.options.record {
+                    recorder.begin();
+                }
                 self.redraw_in_time();
             }
             Wake::Notice(text) => self.say(text),
+            Wake::Copy(text) => self.copy(text),
+            Wake::Opened(name) => {
+                self.options.title = format!("Penumbra – {name}");
+                self.options.screenshot_stem = name;
+                self.redraw();
+            }
+            Wake::Reference(picture) => self.kept = Some(picture),
             Wake::OpenFailed(why) => self.fail(event_loop, ViewError::Scene(why)),
             Wake::Crashed(why) => self.fail(event_loop, ViewError::Lost(format!("internal error: {why}"))),
         }
@@ -269,6 +301,7 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.redraw();
             }
             WindowEvent::Focused(false) => self.leave(),
+            WindowEvent::DroppedFile(path) => self.send(Command::Open(path)),
             WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
                 self.key(event_loop, &event, is_synthetic);
             }
@@ -290,6 +323,7 @@ impl ApplicationHandler<Wake> for Viewer {
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let now = Instant::now();
+        self.replay(event_loop, now);
         if is_due(&mut self.due.redraw, now) {
             self.redraw();
         }

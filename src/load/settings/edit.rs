@@ -244,6 +244,41 @@ pub(super) fn apply_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<(), 
 
 fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -> Result<(), LoadError> {
     let edit = table.get_ref();
+    if let Some(origin) = edit.origin {
+        sink.report.render.origin = Some(origin);
+    }
+    let path = edit.entity.join("/");
+    match change(sink.world, edit) {
+        Ok(Changed::Nothing) if path.is_empty() => {}
+        Ok(Changed::Nothing) => {
+            sink.warn(format!(
+                "{}: [[edit]] of \"{path}\": there is no such thing in the scene",
+                settings.file
+            ));
+        }
+        Ok(Changed::Old) => {}
+        Ok(Changed::New(copy)) => sink.note_spawned(copy),
+        Err(problem) => return Err(settings.broken(table, &format!("[[edit]] of \"{path}\""), problem)),
+    }
+    Ok(())
+}
+
+/// What an edit was about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Changed {
+    /// Something that is not there.
+    Nothing,
+    /// Something that was there.
+    Old,
+    /// This copy.
+    New(Entity),
+}
+
+/// Changes the world as `edit` says.
+///
+/// # Errors
+/// What about it is wrong.
+pub fn change(world: &mut World, edit: &EditTable) -> Result<Changed, String> {
     let mut check = Check::default();
     let mut matrix = None;
     if let Some(rows) = edit.matrix {
@@ -258,21 +293,22 @@ fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -
     }
     if let Some(origin) = edit.origin {
         check.point("origin", origin);
-        sink.report.render.origin = Some(origin);
     }
-    let path = edit.entity.join("/");
-    if edit.entity.is_empty() {
-        return check.problem.map_or(Ok(()), |problem| Err(settings.broken(table, "[[edit]]", problem)));
-    }
-    let entity = match &edit.copy_of {
-        Some(original) => find(sink.world, original).map(|from| copy(sink, from, edit.entity.last())),
-        None => find(sink.world, &edit.entity),
+    let name = edit.entity.last().map_or("copy", String::as_str);
+    let (entity, changed) = match &edit.copy_of {
+        Some(original) => match find(world, original) {
+            Some(original) => {
+                let copy = duplicate(world, original, name);
+                (copy, Changed::New(copy))
+            }
+            None => return Ok(Changed::Nothing),
+        },
+        None => match find(world, &edit.entity) {
+            Some(entity) => (entity, Changed::Old),
+            None => return check.problem.map_or(Ok(Changed::Nothing), Err),
+        },
     };
-    let Some(entity) = entity else {
-        sink.warn(format!("{}: [[edit]] of \"{path}\": there is no such thing in the scene", settings.file));
-        return Ok(());
-    };
-    let mut place = sink.world.entity_mut(entity);
+    let mut place = world.entity_mut(entity);
     if let Some(matrix) = matrix {
         place.insert(matrix);
     }
@@ -289,21 +325,11 @@ fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -
     if let Some(values) = &edit.material {
         let slot = edit.slot.unwrap_or(0);
         let material = place.get::<Instance>().and_then(|instance| instance.materials.get(slot).copied());
-        if let Some(mut material) = material.and_then(|m| sink.world.get_mut::<Material>(m)) {
+        if let Some(mut material) = material.and_then(|m| world.get_mut::<Material>(m)) {
             values.apply(&mut material, &mut check);
         }
     }
-    match check.problem {
-        None => Ok(()),
-        Some(problem) => Err(settings.broken(table, &format!("[[edit]] of \"{path}\""), problem)),
-    }
-}
-
-/// Another one of the same, beside it.
-fn copy(sink: &mut Sink<'_>, original: Entity, name: Option<&String>) -> Entity {
-    let copy = duplicate(sink.world, original, name.map_or("copy", String::as_str));
-    sink.note_spawned(copy);
-    copy
+    check.problem.map_or(Ok(changed), Err)
 }
 
 /// Spawns another instance or light like `original`, beside it, called `name`.
