@@ -94,6 +94,8 @@ pub struct FrameStats {
     pub preview_scale: Option<u32>,
     /// Samples dropped because they were not finite.
     pub dropped: u64,
+    /// Whether the last frame was the first one of this picture.
+    pub begun: bool,
 }
 
 /// A world that can make frames.
@@ -201,9 +203,14 @@ fn frame_schedule() -> Schedule {
             .chain()
             .in_set(Sync),
         trace_frame.in_set(Trace),
-        develop_film.run_if(|budget: Res<FrameBudget>| budget.develop).in_set(Present),
+        develop_film.run_if(is_worth_developing).in_set(Present),
     ));
     frame
+}
+
+/// Somebody looks, and does not wait for a newer picture already: one key press costs one picture.
+fn is_worth_developing(budget: Res<FrameBudget>, stats: Res<FrameStats>) -> bool {
+    budget.develop && (stats.begun || !budget.interrupt.load(Ordering::Relaxed))
 }
 
 /// Adds samples to the film within the budget; first of all a preview, if somebody watches.
@@ -236,7 +243,8 @@ pub fn trace_frame(
     let mut seconds = 0.0;
     let mut rays = RayCounts::default();
     // Once for each reset: a preview that came anew each frame would leave no time for anything else.
-    if std::mem::replace(&mut *previewed, redone.resets) != redone.resets {
+    stats.begun = std::mem::replace(&mut *previewed, redone.resets) != redone.resets;
+    if stats.begun {
         stats.noise = None;
         stats.noise_samples = 0;
         if budget.preview {
@@ -278,7 +286,9 @@ pub fn trace_frame(
     stats.dropped = film.dropped();
     // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter.
     let complete = film.complete_samples();
+    let has_time = stats.done || !(budget.develop && budget.interrupt.load(Ordering::Relaxed));
     if complete >= 2
+        && has_time
         && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
         && complete != stats.noise_samples
     {

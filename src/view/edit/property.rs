@@ -80,7 +80,8 @@ const POSITIVE: [f64; 2] = [1e-9, 1e12];
 pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row> {
     let mut rows = Vec::new();
     let mut add = |property, label, value: f64, step: f64, grows: bool, range: [f64; 2]| {
-        rows.push(Row { property, label, value, step, grows, range });
+        // Adding 0 turns −0 into 0.
+        rows.push(Row { property, label, value: value + 0.0, step, grows, range });
     };
     let light = world.get::<Light>(entity);
     let has_place = !matches!(light, Some(Light::Environment { .. }));

@@ -33,6 +33,8 @@ pub fn show(context: &Context, status: &Status, measured: Measured, all: bool) {
 fn show_cell(ui: &mut Ui, cell: &Cell) {
     ui.vertical(|ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
+        // A short value shall not break the name above it.
+        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
         ui.label(RichText::new(cell.label).color(FAINT).small());
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 5.0;
