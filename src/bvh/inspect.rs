@@ -234,7 +234,7 @@ impl Walk {
 
     /// Tests the triangles of a leaf.
     fn test(&mut self, blas: &Blas, probe: &Probe, leaf: (usize, usize), instance: u32) {
-        for (triangle, corners) in blas.leaves.triangles(leaf) {
+        for (triangle, corners) in blas.leaves.numbered(leaf) {
             self.visits.triangles += 1;
             if let Some(found) = probe.triangle(&corners, self.t_max) {
                 let hit = Hit { t: found.t, u: found.u, v: found.v, triangle, instance };

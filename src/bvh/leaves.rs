@@ -80,10 +80,15 @@ impl Leaves {
         })
     }
 
-    /// The triangles of a leaf, with their numbers.
-    pub fn triangles(&self, (first, count): (usize, usize)) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+    /// The triangles of a leaf.
+    pub fn triangles(&self, first: usize, count: usize) -> impl Iterator<Item = [Vec3; 3]> {
         let rows = &self.rows[first * 9..(first + count) * 9];
-        (0..count).map(move |i| (self.ids[first + i], Self::corners(rows, count, i)))
+        (0..count).map(move |i| Self::corners(rows, count, i))
+    }
+
+    /// The triangles of a leaf, with their numbers.
+    pub fn numbered(&self, (first, count): (usize, usize)) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        self.ids[first..first + count].iter().copied().zip(self.triangles(first, count))
     }
 
     pub fn bytes(&self) -> usize {

@@ -1,7 +1,10 @@
 //! Pixels → rays.
 
+use super::block::{LANES, Row, Rows};
+use super::sampler::SamplerRow;
 use super::warp::disk;
 use crate::bvh::Ray;
+use crate::bvh::simd::{Job, Simd};
 use crate::scene::{Lens, Projection};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DVec3, UVec2, Vec2, Vec3};
@@ -63,6 +66,12 @@ impl Viewpoint {
         Self { lens, ..self }
     }
 
+    /// Whether rays through one point of the picture begin at several.
+    #[must_use]
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
+    }
+
     /// In words, every bit of it, at its place in the world: `origin` is that of render space.
     #[must_use]
     pub fn description(&self, origin: DVec3) -> String {
@@ -76,6 +85,7 @@ impl Viewpoint {
     }
 
     /// The ray through `point`, in pixels from the top left of a picture of `size`; unit direction.
+    #[inline(always)]
     #[must_use]
     pub fn ray(&self, point: Vec2, size: UVec2) -> Ray {
         let size = size.as_vec2();
@@ -84,19 +94,18 @@ impl Viewpoint {
         let y = 1.0 - 2.0 * point.y / size.y;
         let offset = (self.right * x + self.up * y) * self.half_height;
         if self.perspective {
-            Ray::new(self.origin, (offset - self.back).normalize())
+            let along = offset - self.back;
+            Ray::new(self.origin, along * (1.0 / along.length()))
         } else {
             Ray::new(self.origin + offset, -self.back)
         }
     }
 
-    /// As [`Viewpoint::ray`], from a point of the lens that `random` in [0, 1)² chooses, if there is a lens.
+    /// A [`Viewpoint::ray`] from the point of the lens that `random` in [0, 1)² chooses, if there is a lens.
     #[must_use]
-    #[inline]
-    pub fn ray_through_lens(&self, point: Vec2, size: UVec2, random: impl FnOnce() -> Vec2) -> Ray {
-        let ray = self.ray(point, size);
+    pub fn through_lens(&self, ray: Ray, random: Vec2) -> Ray {
         let Some(lens) = self.lens else { return ray };
-        let on_lens = disk(random()) * lens.radius;
+        let on_lens = disk(random) * lens.radius;
         let sharp = ray.at(lens.focus / -ray.direction.dot(self.back));
         let origin = ray.origin + self.right * on_lens.x + self.up * on_lens.y;
         Ray::new(origin, (sharp - origin).normalize())
@@ -118,6 +127,47 @@ impl Viewpoint {
     #[must_use]
     pub fn depth(&self, ray: &Ray, t: f32) -> f32 {
         -self.back.dot(ray.at(t) - self.origin)
+    }
+}
+
+/// The pair of random numbers that chooses the place on the lens; that of the place in the pixel is 0.
+pub(super) const LENS: u32 = 1;
+
+/// Rays through the pixels with these top left `corners`, each at a place of its own in the pixel.
+pub(super) struct Look<'a> {
+    pub viewpoint: &'a Viewpoint,
+    pub size: UVec2,
+    pub samplers: &'a SamplerRow<LANES>,
+    pub corners: [&'a Row; 2],
+    /// What comes out; no more than a row.
+    pub rays: &'a mut [Ray],
+}
+
+impl Job for Look<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+        self.samplers.pairs(0, &mut x, &mut y);
+        let (mut lens_x, mut lens_y) = ([0.0; LANES], [0.0; LANES]);
+        let has_lens = self.viewpoint.has_lens();
+        if has_lens {
+            self.samplers.pairs(LENS, &mut lens_x, &mut lens_y);
+        }
+        let (mut origins, mut directions) = (Rows::blank(), Rows::blank());
+        for i in 0..LANES {
+            let point = Vec2::new(self.corners[0][i] + x[i], self.corners[1][i] + y[i]);
+            let mut ray = self.viewpoint.ray(point, self.size);
+            if has_lens {
+                ray = self.viewpoint.through_lens(ray, Vec2::new(lens_x[i], lens_y[i]));
+            }
+            origins.set(i, ray.origin);
+            directions.set(i, ray.direction);
+        }
+        for (i, ray) in self.rays.iter_mut().enumerate() {
+            *ray = Ray::new(origins.get(i), directions.get(i));
+        }
     }
 }
 
@@ -157,7 +207,7 @@ mod tests {
             let (mut widest, mut seen) = (0f32, 0);
             for i in 0..256u32 {
                 let random = Vec2::new((i % 16) as f32 + 0.5, (i / 16) as f32 + 0.5) / 16.0;
-                let ray = viewpoint.ray_through_lens(place, size, || random);
+                let ray = viewpoint.through_lens(viewpoint.ray(place, size), random);
                 let near = (sharp.at(t) - ray.origin).reject_from(ray.direction).length();
                 assert!(near < 1e-5, "{near}");
                 assert!((ray.direction.length() - 1.0).abs() < 1e-6);

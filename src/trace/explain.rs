@@ -1,8 +1,11 @@
-//! Why a pixel looks as it does: its very samples once more, with everything written down.
+//! Why a pixel looks as it does: samples of it once more, with everything written down.
 
 use super::TraceScene;
+use super::bsdf::Bsdf;
+use super::camera::LENS;
 use super::integrator::{Batch, LIGHT, PAIRS_PER_BOUNCE, PICK, Path, Shadow};
 use super::light::FlatLight;
+use super::sampler::Sampler;
 use super::surface::Interaction;
 use crate::bvh::inspect::Order;
 use crate::bvh::{Hit, Ray};
@@ -72,33 +75,45 @@ pub struct Explanation {
     pub segments: Vec<Segment>,
     /// By bounce, then light.
     pub lights: Vec<LightRow>,
-    /// Radiance of each sample.
+    /// Light that the samples of lights bring to each; what rays run into is not in it.
     pub radiance: Vec<Vec3>,
     /// The first sample's camera ray.
     pub ray: Option<Ray>,
 }
 
-/// Follows `samples` of `pixel` as the film does. `far` is how long a ray that meets nothing is drawn.
+/// Follows `samples` of `pixel`, and samples all light on the way: also what the film would rather compute in closed
+/// form, so that one sees where it comes from. `far` is how long a ray that meets nothing is drawn.
 #[must_use]
 pub fn explain(scene: &TraceScene, pixel: UVec2, samples: Range<u32>, far: f32) -> Explanation {
+    let halves = Sampler::halves(pixel, scene.settings);
+    let mut paths: Vec<Path> = samples
+        .zip(0..)
+        .map(|(sample, entry)| {
+            let sampler = halves[sample as usize & 1].at(sample);
+            let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), scene.settings.size);
+            let ray = scene.viewpoint.through_lens(ray, sampler.pair(LENS));
+            Path { entry, sampler, ray, throughput: Vec3::ONE, depth: 0, bounce: None, last: false }
+        })
+        .collect();
+    let ray = paths.first().map(|path| path.ray);
+    let mut told =
+        Explanation { pixel, ray, radiance: vec![Vec3::ZERO; paths.len()], ..Explanation::default() };
     let mut batch = Batch::default();
-    batch.begin_pixel(scene, pixel, samples);
-    let ray = batch.paths.first().map(|path| path.ray);
-    let mut told = Explanation { pixel, ray, ..Explanation::default() };
-    while !batch.paths.is_empty() {
-        batch.shade(scene);
-        for (path, hit) in batch.paths.iter().zip(&batch.hits) {
-            told.segments.push(path_segment(scene, path, hit.as_ref(), far));
-            told.sampled(scene, path, hit.as_ref());
+    while !paths.is_empty() {
+        batch.next.clear();
+        batch.shadows.clear();
+        for path in &paths {
+            let mut hit = [None];
+            scene.closest_hits(&[path.ray], &mut hit, |_, key| path.sampler.hashed(key ^ path.depth));
+            told.segments.push(path_segment(scene, path, hit[0].as_ref(), far));
+            told.arrive(scene, &mut batch, path, hit[0]);
         }
+        let depth = paths.first().map_or(0, |path| path.depth);
         for shadow in &batch.shadows {
-            let depth = batch.paths.first().map_or(0, |path| path.depth);
             told.connected(scene, shadow, depth, far);
         }
-        batch.connect_lights(scene);
-        batch.go_on();
+        paths = std::mem::take(&mut batch.next);
     }
-    told.radiance.clone_from(&batch.radiance);
     told.finish();
     told
 }
@@ -139,20 +154,25 @@ impl Explanation {
         &mut self.lights[index]
     }
 
-    /// Notes the lights that were sampled where `path` ends: the same numbers choose the same points.
-    fn sampled(&mut self, scene: &TraceScene, path: &Path, hit: Option<&Hit>) {
+    /// Samples the lights where `path` ends, and goes on from there.
+    fn arrive(&mut self, scene: &TraceScene, batch: &mut Batch, path: &Path, hit: Option<Hit>) {
         let Some(hit) = hit else { return };
-        let shaded = path.depth < scene.settings.max_depth && !scene.lights.is_empty();
-        if !shaded || scene.lights.closest(&Ray { t_max: hit.t, ..path.ray }).is_some() {
+        let ends = path.last || path.depth >= scene.settings.max_depth;
+        if ends || scene.lights.closest(&Ray { t_max: hit.t, ..path.ray }).is_some() {
             return;
         }
-        let (instance, surface) = scene.surface_at(hit);
+        let (instance, surface) = scene.surface_at(&hit);
         if surface.material.unlit {
             return;
         }
-        let at = Interaction::new(scene, instance, hit, &path.ray);
-        let bsdf = at.bsdf(scene, surface);
-        if !bsdf.has_smooth_lobes() {
+        let at = Interaction::new(scene, instance, &hit, &path.ray);
+        batch.scatter(scene, path, surface, &at);
+        self.sampled(scene, path, &at, &at.bsdf(scene, surface));
+    }
+
+    /// Notes the lights that were sampled: the same numbers choose the same points.
+    fn sampled(&mut self, scene: &TraceScene, path: &Path, at: &Interaction, bsdf: &Bsdf) {
+        if !bsdf.has_smooth_lobes() || scene.lights.is_empty() {
             return;
         }
         let base = 1 + path.depth * PAIRS_PER_BOUNCE;
@@ -195,6 +215,8 @@ impl Explanation {
         row.visits[1] += visits.triangles as f32;
         row.unblocked += luminance(shadow.contribution);
         if !blocked {
+            self.radiance[shadow.entry as usize] += shadow.contribution;
+            let row = self.row(scene, depth, shadow.light);
             row.lit += 1;
             row.contribution += luminance(shadow.contribution);
         }
@@ -223,7 +245,7 @@ pub fn name_of(light: &FlatLight) -> &'static str {
         FlatLight::Directional { .. } => "sun",
         FlatLight::Segment { .. } => "segment",
         FlatLight::Shape(light) => match light.shape {
-            Shape::Parallelogram { .. } => "parallelogram",
+            Shape::Parallelogram(_) => "parallelogram",
             Shape::Disk { .. } => "disk",
             Shape::Sphere { .. } => "sphere",
         },

@@ -4,7 +4,7 @@ use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
 use crate::bvh::{Accept, Hit, Ray, Tlas};
-use crate::scene::{Alpha, Material, Texture, TriangleMesh};
+use crate::scene::{Alpha, Glossy, Material, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -66,6 +66,20 @@ pub struct Surface {
     pub emission_texture: Option<TextureIndex>,
 }
 
+impl Surface {
+    /// Whether all it does is to reflect evenly (Lambert), whatever its colour.
+    #[inline]
+    #[must_use]
+    pub fn is_diffuse(&self) -> bool {
+        let m = &self.material;
+        matches!(m.glossy, Glossy::None)
+            && m.mirror == Vec3::ZERO
+            && m.glass.is_none()
+            && m.emission == Vec3::ZERO
+            && !m.unlit
+    }
+}
+
 /// A texture and how to reach into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureIndex {
@@ -100,6 +114,7 @@ pub struct TraceScene<'a> {
 
 impl<'a> TraceScene<'a> {
     /// The instance and the material of a hit.
+    #[inline]
     #[must_use]
     pub fn surface_at(&self, hit: &Hit) -> (&'a InstanceData, &'a Surface) {
         let instance = &self.geometry.instances[hit.instance as usize];

@@ -306,8 +306,7 @@ fn not_finite(film: &Film) -> Vec<[u8; 3]> {
     let mut colors = vec![[0; 3]; size.element_product() as usize];
     for tile in film.tiles() {
         for (i, pixel) in (0..).zip(tile.pixels()) {
-            let wanted =
-                u64::from(tile.next_sample - film.first_sample()) + u64::from(tile.more[tile.color(i)]);
+            let wanted = u64::from(tile.next_of(i as usize) - film.first_sample());
             let place = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
             let dim = (srgb_from_linear(luminance(pixel.mean().as_vec3())) * 90.0) as u8;
             let dropped = pixel.count() < wanted;
