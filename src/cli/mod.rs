@@ -323,7 +323,7 @@ pub enum ToneMapArg {
     Clip,
     /// Khronos PBR Neutral.
     Neutral,
-    /// AgX: bright colours fade to white.
+    /// As film does: bright colours fade to white.
     Agx,
     /// ACES, by its usual fit.
     Aces,

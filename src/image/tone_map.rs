@@ -10,7 +10,7 @@ pub enum ToneMap {
     Clip,
     /// Khronos PBR Neutral: colours stay, highlights roll off.
     Neutral,
-    /// AgX: a film-like curve, and bright colours fade to white.
+    /// `AgX`: a film-like curve, and bright colours fade to white.
     AgX,
     /// The ACES look, by its usual fit.
     Aces,
@@ -47,8 +47,8 @@ impl ToneMap {
 
     /// Maps exposed linear radiance to linear display values; what is still outside 0..=1 clips.
     ///
-    /// Neutral: Khronos PBR Neutral tone mapper specification, 2024. AgX: T. Sobotka, 2022, with the matrices
-    /// and the polynomial of B. Wrensch, "Minimal AgX Implementation", 2023. ACES: K. Narkowicz, "ACES Filmic
+    /// Neutral: Khronos PBR Neutral tone mapper specification, 2024. `AgX`: T. Sobotka, 2022, with the matrices
+    /// and the polynomial of B. Wrensch, "Minimal `AgX` Implementation", 2023. ACES: K. Narkowicz, "ACES Filmic
     /// Tone Mapping Curve", 2016.
     #[must_use]
     pub fn apply(self, color: Vec3) -> Vec3 {
@@ -82,7 +82,7 @@ fn agx(color: Vec3) -> Vec3 {
     const INSET: Mat3 = Mat3::from_cols(
         Vec3::new(0.842_479_06, 0.042_328_24, 0.042_375_655),
         Vec3::new(0.078_433_6, 0.878_468_64, 0.078_433_6),
-        Vec3::new(0.079_223_745, 0.079_166_13, 0.879_142_97),
+        Vec3::new(0.079_223_745, 0.079_166_13, 0.879_143),
     );
     const OUTSET: Mat3 = Mat3::from_cols(
         Vec3::new(1.196_879, -0.052_896_85, -0.052_971_635),

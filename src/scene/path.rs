@@ -21,8 +21,8 @@ pub fn path_of(world: &World, entity: Entity) -> Vec<String> {
 /// The entity at the end of `path`, if there is one.
 #[must_use]
 pub fn find(world: &World, path: &[String]) -> Option<Entity> {
-    path.iter().fold(Some(None), |here: Option<Option<Entity>>, name| {
-        let found = labels(world, here?).into_iter().find(|(_, label)| label == name);
+    path.iter().try_fold(None, |here: Option<Entity>, name| {
+        let found = labels(world, here).into_iter().find(|(_, label)| label == name);
         found.map(|(entity, _)| Some(entity))
     })?
 }

@@ -178,7 +178,6 @@ pub fn refine_first_hits(
 pub struct DepthWanted(pub bool);
 
 /// Makes the picture of anything but light.
-#[expect(clippy::too_many_arguments, reason = "all that can be shown")]
 pub fn develop_pixel_view(
     view: Res<PixelView>,
     film: Res<Film>,

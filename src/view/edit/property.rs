@@ -103,9 +103,9 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         let mean = all.iter().sum::<Vec3>() / all.len().max(1) as f32;
         add(Property::Power, "power", f64::from(luminance(mean)), 0.1, true, [0.0, 1e12]);
         let most = f64::from(mean.max_element()).max(1e-30);
-        for channel in 0..3 {
+        for (channel, label) in AXES[2].into_iter().enumerate() {
             let share = f64::from(mean[channel]) / most;
-            add(Property::LightColor(channel), AXES[2][channel], share, 0.05, false, UNIT);
+            add(Property::LightColor(channel), label, share, 0.05, false, UNIT);
         }
         for (i, size) in sizes(light).into_iter().enumerate() {
             let (label, degrees) = size_label(light, i);
@@ -115,9 +115,9 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         }
     }
     if let Some(material) = material_of(world, entity, slot).and_then(|m| world.get::<Material>(m)) {
-        for channel in 0..3 {
+        for (channel, label) in AXES[2].into_iter().enumerate() {
             let value = f64::from(material.base_color[channel]);
-            add(Property::BaseColor(channel), AXES[2][channel], value, 0.05, false, UNIT);
+            add(Property::BaseColor(channel), label, value, 0.05, false, UNIT);
         }
         match material.glossy {
             Glossy::None => {}

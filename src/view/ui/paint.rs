@@ -100,8 +100,9 @@ fn edge(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i64 {
 }
 
 fn draw_triangle(target: &mut Target, mut corners: [Vertex; 3], atlas: &Atlas, scale: f32) {
-    let far = |v: &Vertex| !(v.pos.x.abs().max(v.pos.y.abs()) * scale < FARTHEST);
-    if corners.iter().any(far) {
+    let near = |v: &Vertex| v.pos.x.abs() * scale < FARTHEST && v.pos.y.abs() * scale < FARTHEST;
+    // Nor what is no number.
+    if !corners.iter().all(near) {
         return;
     }
     let place = |v: &Vertex| [v.pos.x, v.pos.y].map(|x| (x * scale * STEPS).round() as i64);

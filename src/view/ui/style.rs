@@ -23,7 +23,6 @@ pub const LINE: Color32 = Color32::from_rgba_premultiplied(36, 36, 38, 40);
 const CARD: Color32 = Color32::from_rgba_premultiplied(13, 14, 17, 214);
 
 /// The ground that everything stands on.
-#[must_use]
 pub fn frame() -> Frame {
     Frame::new()
         .fill(CARD)
