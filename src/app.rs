@@ -5,7 +5,7 @@ use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::{Playing, deform, play, propagate_transforms};
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
-use crate::trace::noise::relative_noise;
+use crate::trace::noise;
 use crate::trace::{
     Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint,
     trace_adaptive, trace_pass,
@@ -51,9 +51,10 @@ pub struct FrameBudget {
     pub sample_target: u32,
     /// Samples per pixel of one pass, if there is no time limit.
     pub pass_samples: u32,
-    /// For somebody who watches: a coarse whole picture first when the film was reset, and a developed
-    /// [`Picture`] at the end of each frame.
+    /// For somebody who watches: a coarse whole picture first when the film was reset.
     pub preview: bool,
+    /// For somebody who watches: a developed [`Picture`] at the end of each frame.
+    pub develop: bool,
 }
 
 impl Default for FrameBudget {
@@ -65,6 +66,7 @@ impl Default for FrameBudget {
             sample_target: 64,
             pass_samples: 1,
             preview: false,
+            develop: false,
         }
     }
 }
@@ -78,8 +80,10 @@ pub struct FrameStats {
     pub done: bool,
     /// Estimated relative noise of the picture (0.02 = 2 %), from two samples per pixel on.
     pub noise: Option<f64>,
-    /// Samples per pixel that `noise` is of.
-    noise_samples: u32,
+    /// How well it is known: see [`noise::Noise::doubt`].
+    pub noise_doubt: f64,
+    /// Samples per pixel that `noise` is of; 0 if it is of none.
+    pub noise_samples: u32,
     /// Rays since the world was made, by kind.
     pub rays: RayCounts,
     /// Seconds spent tracing since the world was made.
@@ -90,6 +94,8 @@ pub struct FrameStats {
     pub preview_scale: Option<u32>,
     /// Samples dropped because they were not finite.
     pub dropped: u64,
+    /// Whether the last frame was the first one of this picture.
+    pub begun: bool,
 }
 
 /// A world that can make frames.
@@ -120,6 +126,7 @@ impl App {
         world.init_resource::<MaterialNumbers>();
         world.init_resource::<BlasCache>();
         world.init_resource::<Redone>();
+        world.init_resource::<sync::Entities>();
         world.add_schedule(frame_schedule());
         Self { world }
     }
@@ -198,9 +205,14 @@ fn frame_schedule() -> Schedule {
             .chain()
             .in_set(Sync),
         trace_frame.in_set(Trace),
-        develop_film.run_if(|budget: Res<FrameBudget>| budget.preview).in_set(Present),
+        develop_film.run_if(is_worth_developing).in_set(Present),
     ));
     frame
+}
+
+/// Somebody looks, and does not wait for a newer picture already: one key press costs one picture.
+fn is_worth_developing(budget: Res<FrameBudget>, stats: Res<FrameStats>) -> bool {
+    budget.develop && (stats.begun || !budget.interrupt.load(Ordering::Relaxed))
 }
 
 /// Adds samples to the film within the budget; first of all a preview, if somebody watches.
@@ -233,7 +245,8 @@ pub fn trace_frame(
     let mut seconds = 0.0;
     let mut rays = RayCounts::default();
     // Once for each reset: a preview that came anew each frame would leave no time for anything else.
-    if std::mem::replace(&mut *previewed, redone.resets) != redone.resets {
+    stats.begun = std::mem::replace(&mut *previewed, redone.resets) != redone.resets;
+    if stats.begun {
         stats.noise = None;
         stats.noise_samples = 0;
         if budget.preview {
@@ -275,11 +288,15 @@ pub fn trace_frame(
     stats.dropped = film.dropped();
     // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter.
     let complete = film.complete_samples();
+    let has_time = stats.done || !(budget.develop && budget.interrupt.load(Ordering::Relaxed));
     if complete >= 2
+        && has_time
         && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
         && complete != stats.noise_samples
     {
-        stats.noise = relative_noise(&film);
+        let noise = noise::estimate(&film);
+        stats.noise = noise.map(|noise| noise.relative);
+        stats.noise_doubt = noise.map_or(0.0, |noise| noise.doubt);
         stats.noise_samples = complete;
     }
 }

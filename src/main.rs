@@ -1,6 +1,6 @@
 //! The `penumbra` command: arguments in, exit code out. The one place that prints.
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use penumbra::cli::{
     CheckArgs, Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs,
@@ -13,7 +13,7 @@ use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use penumbra::report::{Report, ReportError, measure_all, write};
 #[cfg(feature = "view")]
-use penumbra::{app::FrameBudget, open::open, trace::RenderSettings};
+use penumbra::{app::FrameBudget, open::open, render::open_reference, trace::RenderSettings};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,7 +39,21 @@ mod exit {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let code = match cli.command {
-        Some(Command::Render(args)) => headless(&args.scene, &args.output),
+        Some(Command::Render(args)) => {
+            let output = args.output.clone();
+            match args.scene() {
+                Ok(scene) => headless(&scene, &output),
+                Err(error) => {
+                    eprintln!("error: {error}");
+                    exit::BAD_COMMAND_LINE
+                }
+            }
+        }
+        Some(Command::Completions(args)) => {
+            clap_complete::generate(args.shell, &mut Cli::command(), "penumbra", &mut std::io::stdout());
+            0
+        }
+        Some(Command::Man) => manual(),
         Some(Command::Check(args)) => check(&args),
         Some(Command::Compare(args)) => compare(&args),
         Some(Command::Merge(args)) => merge(&args),
@@ -54,6 +68,11 @@ fn main() -> ExitCode {
         None => window(&cli.window),
     };
     ExitCode::from(code)
+}
+
+/// Prints the manual page. Whoever closed standard output does not want to read it.
+fn manual() -> u8 {
+    u8::from(clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout()).is_err())
 }
 
 #[cfg(not(feature = "view"))]
@@ -73,11 +92,39 @@ fn window(args: &WindowArgs) -> u8 {
         }
     };
     set_threads(args.scene.threads);
+    let keys = match penumbra::view::keys_file::read(args.keys.as_deref()) {
+        Ok(keys) => keys,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::BAD_COMMAND_LINE;
+        }
+    };
+    let replay = args.replay.as_deref().map(penumbra::view::replay::Replay::open).transpose();
+    let record = args.record.as_deref().map(penumbra::view::replay::Recorder::create).transpose();
+    let (replay, record) = match replay.and_then(|replay| Ok((replay, record?))) {
+        Ok(both) => both,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::BAD_COMMAND_LINE;
+        }
+    };
+    let replays = replay.is_some();
+    let reference = match args.output.reference.as_deref().map(open_reference).transpose() {
+        Ok(reference) => reference,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return exit::FAILED;
+        }
+    };
     let (wishes, even) = (args.scene.wishes(&args.output), args.scene.even);
     let options = ViewOptions {
         title: format!("Penumbra – {}", source.name()),
         size: wishes.size.unwrap_or(RenderSettings::default().size),
         screenshot_stem: source.name(),
+        reference,
+        keys,
+        replay,
+        record,
         exit_after: None,
     };
     let load = args.scene.load_options();
@@ -92,7 +139,12 @@ fn window(args: &WindowArgs) -> u8 {
         Err(error) => Err(error.to_string()),
     });
     match opened {
-        Ok(()) => 0,
+        Ok(response) => {
+            if replays {
+                println!("{}", response.json());
+            }
+            0
+        }
         Err(ViewError::NoDisplay(why)) => {
             eprintln!("no window: {why}; rendering to a picture instead");
             instead_of_window(args)
@@ -114,6 +166,10 @@ fn instead_of_window(args: &WindowArgs) -> u8 {
 }
 
 fn headless(scene: &SceneArgs, output: &OutputArgs) -> u8 {
+    if output.reference.is_some() && output.error_log.is_none() {
+        eprintln!("error: --reference needs --error-log FILE.csv to write the errors to");
+        return exit::BAD_COMMAND_LINE;
+    }
     let mut outputs = match files_to_write(&output.output) {
         Ok(outputs) => outputs,
         Err(error) => {

@@ -5,8 +5,8 @@ use crate::bvh::Isa;
 use crate::first_look;
 use crate::image::{Display, ToneMap};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
-use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Projection, Transform};
-use crate::sync::Instructions;
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform};
+use crate::sync::{Instructions, RenderOrigin};
 use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -45,7 +45,7 @@ pub struct Wishes {
 }
 
 /// Changes to a camera, in world space.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Where it is.
     pub position: Option<DVec3>,
@@ -55,6 +55,12 @@ pub struct Pose {
     pub view_up: Option<DVec3>,
     /// Vertical field of view in degrees.
     pub view_angle: Option<f32>,
+    /// Parallel rays: height of the picture in scene units.
+    pub orthographic: Option<f32>,
+    /// Radius of the lens in scene units; 0 for none.
+    pub lens_radius: Option<f32>,
+    /// Distance of what is sharp in scene units; that of the focal point, or of the scene, if not said.
+    pub focus_distance: Option<f32>,
 }
 
 /// Why there is no world to make frames with.
@@ -117,6 +123,10 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     };
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);
+    app.world.insert_resource(SceneOrigin { source: source.clone(), options: options.clone() });
+    if let Some(origin) = report.render.origin {
+        app.world.insert_resource(RenderOrigin(Some(origin.into())));
+    }
     app.world.insert_resource(settings);
     app.world.insert_resource(Instructions(wishes.isa.unwrap_or_default()));
     app.world.insert_resource(Film::new(settings.size, wishes.first_sample.unwrap_or(0)));
@@ -133,6 +143,15 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     first_look::settle(&mut app, &mut report, &source.to_string(), exposure.is_none());
     let build_seconds = start.elapsed().as_secs_f64();
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
+}
+
+/// Where the scene in a world comes from, to load or to speak of it again.
+#[derive(Resource, Clone, Debug)]
+pub struct SceneOrigin {
+    /// The scene.
+    pub source: SceneSource,
+    /// How it was loaded.
+    pub options: LoadOptions,
 }
 
 fn choose_camera(
@@ -153,11 +172,7 @@ fn choose_camera(
         world.insert_resource(ActiveCamera(*camera));
     }
     let pose = &wishes.pose;
-    if pose.position.is_none()
-        && pose.focal_point.is_none()
-        && pose.view_up.is_none()
-        && pose.view_angle.is_none()
-    {
+    if *pose == Pose::default() {
         return Ok(());
     }
     // The file's camera stays what it is; this is one more, standing where it stands.
@@ -168,6 +183,9 @@ fn choose_camera(
     if let Some(degrees) = pose.view_angle {
         camera.projection = Projection::Perspective { vertical_fov: degrees.to_radians() };
     }
+    if let Some(height) = pose.orthographic {
+        camera.projection = Projection::Orthographic { height };
+    }
     let mut transform = Transform(global.0);
     if pose.position.is_some() || pose.focal_point.is_some() || pose.view_up.is_some() {
         let eye = pose.position.unwrap_or(global.0.translation);
@@ -175,7 +193,17 @@ fn choose_camera(
         let up = pose.view_up.unwrap_or(DVec3::Y);
         transform = Transform::looking_at(eye, pose.focal_point.unwrap_or(eye + ahead), up);
     }
+    let lens = from.and_then(|e| world.get::<Lens>(e)).copied();
+    let default_focus = || {
+        let target = pose.focal_point.or(world.get_resource::<SceneBounds>().map(|bounds| bounds.center));
+        target.map_or(1.0, |target| (target - transform.0.translation).length() as f32)
+    };
+    let focus = pose.focus_distance.or(lens.map(|l| l.focus)).unwrap_or_else(default_focus);
+    let radius = pose.lens_radius.or(lens.map(|l| l.radius)).unwrap_or(0.0);
     let entity = world.spawn((camera, transform, Name::new("command line"))).id();
+    if radius > 0.0 {
+        world.entity_mut(entity).insert(Lens { radius, focus });
+    }
     world.insert_resource(ActiveCamera(entity));
     Ok(())
 }

@@ -13,7 +13,7 @@ pub struct Preview {
 }
 
 /// Time that a preview may take.
-const TARGET: Duration = Duration::from_millis(20);
+const TARGET: Duration = Duration::from_millis(14);
 /// A finer step is taken only if it is expected to need less than this part of [`TARGET`]: without the
 /// gap two steps would alternate.
 const HEADROOM: f64 = 0.7;
@@ -90,10 +90,10 @@ mod tests {
 
     #[test]
     fn scale_follows_the_measured_time_with_hysteresis() {
-        assert_eq!(at(8, 10.0), 1, "cheap pictures need no preview");
+        assert_eq!(at(8, 9.0), 1, "cheap pictures need no preview");
         assert_eq!(at(1, 100.0), 3, "100 ms at full size is 11 ms at a third");
-        assert_eq!(at(3, 70.0), 3, "17.5 ms at half size would fit, but not with headroom");
-        assert_eq!(at(2, 70.0), 2, "and so it stays from below");
+        assert_eq!(at(3, 50.0), 3, "12.5 ms at half size would fit, but not with headroom");
+        assert_eq!(at(2, 50.0), 2, "and so it stays from below");
         assert_eq!(at(2, 1e9), 16, "never coarser than 16");
     }
 }

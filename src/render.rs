@@ -326,14 +326,20 @@ fn folder_exists(path: &Path) -> Result<(), ImageError> {
     }
 }
 
-/// A picture file or a film, of this size.
+/// A picture file or a film to measure errors by.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn open_reference(path: &Path) -> Result<LinearImage, RenderError> {
+    if is_film(path) {
+        return Ok(LinearImage::of(&FilmFile::read(path)?.film));
+    }
+    Ok(LinearImage::open(path)?)
+}
+
+/// The same, of this size.
 fn reference_picture(path: &Path, size: UVec2) -> Result<LinearImage, RenderError> {
-    let reference = if is_film(path) {
-        let film = FilmFile::read(path)?.film;
-        LinearImage::of(&film)
-    } else {
-        LinearImage::open(path)?
-    };
+    let reference = open_reference(path)?;
     if reference.size == size {
         return Ok(reference);
     }

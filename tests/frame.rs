@@ -12,6 +12,7 @@ use penumbra::scene::{
     TriangleMesh, Visible, Wrap,
 };
 use penumbra::sync::Redone;
+use penumbra::trace::explain::{Kind, explain};
 use penumbra::trace::{Film, Integrator, RenderSettings};
 use std::sync::Arc;
 
@@ -376,6 +377,7 @@ fn a_watched_frame_shows_a_whole_picture_even_if_interrupted_at_once() {
     {
         let mut budget = stage.app.world.resource_mut::<FrameBudget>();
         budget.preview = true;
+        budget.develop = true;
         budget.time = Some(std::time::Duration::ZERO);
         budget.interrupt.store(true, std::sync::atomic::Ordering::Relaxed);
     }
@@ -398,4 +400,45 @@ fn empty_worlds_and_dark_scenes_are_pictures_too() {
     assert!(stage.app.world.despawn(lamp));
     stage.app.frame();
     assert_eq!(stage.film().pixel(20, 15).mean(), DVec3::ZERO);
+}
+
+#[test]
+fn an_explanation_adds_up_to_the_picture() {
+    let mut stage = stage();
+    stage
+        .app
+        .world
+        .spawn((Light::Point { intensity: Vec3::ONE }, Transform::from_translation(DVec3::Y * 2.0)));
+    {
+        let mut budget = stage.app.world.resource_mut::<FrameBudget>();
+        (budget.sample_target, budget.pass_samples) = (64, 64);
+    }
+    stage.app.frame();
+    let scene = penumbra::sync::traceable(&stage.app.world);
+    let (mut lit, mut blocked) = (0, 0);
+    let (mut told_sum, mut film_sum, mut variance) = (0.0, 0.0, 0.0);
+    for (x, y) in (0..SIZE.y).flat_map(|y| (0..SIZE.x).map(move |x| (x, y))) {
+        let told = explain(&scene, UVec2::new(x, y), 0..64, 10.0);
+        assert_eq!(told.radiance.len(), 64);
+        let reds: Vec<f64> = told.radiance.iter().map(|r| f64::from(r.x)).collect();
+        let mean = reds.iter().sum::<f64>() / 64.0;
+        variance += reds.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 64.0 / 63.0;
+        told_sum += mean;
+        film_sum += stage.film().pixel(x, y).mean().x;
+        let brought: f32 = told.lights.iter().map(|row| row.contribution).sum();
+        let all = told.radiance.iter().map(|&r| penumbra::scene::color::luminance(r)).sum::<f32>() / 64.0;
+        assert!((brought - all).abs() <= 1e-4 * all, "{x} {y}: {brought} of {all}");
+        for row in &told.lights {
+            assert!(row.lit + row.dark <= row.samples, "{row:?}");
+            assert!(row.lit == 0 || row.contribution > 0.0, "{row:?}");
+        }
+        let count = |kind| told.segments.iter().filter(|s| s.kind == kind).count();
+        assert_eq!(count(Kind::Camera), 64);
+        assert_eq!(count(Kind::Lit), told.lights.iter().map(|row| row.lit as usize).sum::<usize>());
+        (lit, blocked) = (lit + count(Kind::Lit), blocked + count(Kind::Shadow));
+    }
+    assert!(lit > 1000 && blocked > 30, "the quad throws a shadow: {lit} {blocked}");
+    // No lamp is in view, so all light is that of the samples. The film's share of the noise is smaller still.
+    let off = (told_sum - film_sum).abs() / (2.0 * variance).sqrt();
+    assert!(off < 4.0, "{told_sum} told, {film_sum} in the film: {off} standard errors");
 }

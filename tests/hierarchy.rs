@@ -4,10 +4,11 @@
 mod geometry;
 
 use geometry::containment::check_hierarchy;
-use geometry::{Rng, aimed_ray, boxes, brute_force, check, soup};
-use glam::Vec3;
+use geometry::{Rng, aimed_ray, boxes, brute_force, check, place, soup};
+use glam::{DAffine3, Vec3};
+use penumbra::bvh::inspect::Order;
 use penumbra::bvh::wide::{Child, WIDTH};
-use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Node, WideBvh};
+use penumbra::bvh::{Aabb, Blas, Bvh, Defect, Node, Tlas, WideBvh};
 use std::sync::Arc;
 
 /// A square of 3200 triangles, none of them long or steep enough to be split.
@@ -186,4 +187,39 @@ fn the_checker_finds_a_part_that_is_missing() {
     let mut broken = blas.hierarchy().clone();
     Arc::make_mut(&mut broken.prims)[0] = 7;
     assert!(check_hierarchy(&broken, &needle).is_err());
+}
+
+#[test]
+fn a_ray_that_is_watched_hits_what_the_others_hit_in_any_order() {
+    let triangles = soup(3000, 0.1, 77);
+    let mut rng = Rng(78);
+    let mut placements: Vec<_> = (0..6)
+        .map(|_| DAffine3::from_rotation_translation(rng.rotation(), rng.vec().as_dvec3() * 2.0))
+        .collect();
+    placements.push(DAffine3::IDENTITY);
+    placements.push(placements[0]);
+    let tlas = Tlas::build(placements.iter().map(|&placement| place(&triangles, placement)).collect());
+    let (mut stack, mut queue) = (0, 0);
+    for _ in 0..2000 {
+        let ray = aimed_ray(&mut rng, &triangles, 3.0, Vec3::ZERO);
+        let wanted = tlas.closest_hit(&ray);
+        let mut last = 0.0;
+        let mut steps = 0;
+        let (by_queue, visits) = tlas.inspect(&ray, Order::Queue, false, |step| {
+            // All that is visited is nearer than the hit, each farther than the one before, as its parent is.
+            assert!(step.near <= step.found && step.near >= last * 0.999 - 1e-4, "{step:?} after {last}");
+            last = step.near.max(last);
+            steps += 1;
+        });
+        assert_eq!(by_queue, wanted);
+        assert!(steps > 0);
+        queue += visits.boxes;
+        let (by_stack, visits) = tlas.inspect(&ray, Order::NearFirst, false, |_| {});
+        assert_eq!(by_stack, wanted);
+        stack += visits.boxes;
+        let (any, least) = tlas.inspect(&ray, Order::NearFirst, true, |_| {});
+        assert_eq!(any.is_some(), wanted.is_some());
+        assert!(least.triangles <= visits.triangles);
+    }
+    assert!(queue < stack, "a queue sees fewer boxes: {queue} of {stack}");
 }

@@ -105,6 +105,7 @@ impl Desktop {
         command
             .env("DISPLAY", &self.display)
             .env("XDG_RUNTIME_DIR", &self.directory)
+            .env("XDG_CONFIG_HOME", &self.directory)
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("WAYLAND_SOCKET")
             .current_dir(&self.directory)
@@ -123,13 +124,22 @@ impl Desktop {
     }
 
     fn start_with(&self, arguments: &[&str], environment: &[(&str, &str)]) -> Program {
-        let child = self
-            .command(env!("CARGO_BIN_EXE_penumbra"))
-            .args(arguments)
-            .envs(environment.iter().copied())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
+        self.start_command(
+            self.command(env!("CARGO_BIN_EXE_penumbra"))
+                .args(arguments)
+                .envs(environment.iter().copied())
+                .stdout(Stdio::null()),
+        )
+    }
+
+    /// What it says on standard output goes to `file`.
+    fn start_saying(&self, arguments: &[&str], file: &Path) -> Program {
+        let said = std::fs::File::create(file).unwrap();
+        self.start_command(self.command(env!("CARGO_BIN_EXE_penumbra")).args(arguments).stdout(said))
+    }
+
+    fn start_command(&self, command: &mut Command) -> Program {
+        let child = command.spawn().unwrap();
         let mut program = Program { child, window: String::new() };
         program.window = wait_for("the window", || {
             assert!(program.child.try_wait().unwrap().is_none(), "the program ended at once");
@@ -465,4 +475,219 @@ fn a_wrong_wayland_display_falls_back_to_x11() {
     };
     let mut program = desktop.start_with(SMALL, &[("WAYLAND_DISPLAY", "wayland-nowhere")]);
     desktop.wait_until_done(&mut program);
+}
+
+#[test]
+fn keys_of_the_users_own_fly_and_a_bad_file_is_one_line() {
+    let Some(desktop) = desktop("keys") else {
+        return;
+    };
+    let file = desktop.directory.join("keys.toml");
+    std::fs::write(&file, "forward = 'J'\nquit = ['Ctrl+J']\n").unwrap();
+    let keys = ["--keys", file.to_str().unwrap()];
+    let mut program = desktop.start(&[SMALL, &keys].concat());
+    desktop.hide_status(&mut program);
+    let before = desktop.shot(&program);
+    for (key, moves) in [("w", false), ("j", true)] {
+        desktop.xdotool(["keydown", key]);
+        pause(300);
+        desktop.xdotool(["keyup", key]);
+        pause(100);
+        desktop.wait_until_done(&mut program);
+        assert_eq!(difference(&before, &desktop.shot(&program)) > 0.05, moves, "{key}");
+    }
+    desktop.xdotool(["key", "ctrl+j"]);
+    assert_eq!(program.wait().code(), Some(0));
+
+    std::fs::write(&file, "forwrd = 'J'\n").unwrap();
+    let output = desktop.command(env!("CARGO_BIN_EXE_penumbra")).args(keys).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(
+        said.contains("keys.toml: line 1: nothing is called \"forwrd\"; did you mean \"forward\"?"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_camera_that_is_copied_renders_what_the_window_shows() {
+    let Some(desktop) = desktop("flags") else {
+        return;
+    };
+    let said = desktop.directory.join("said.txt");
+    let mut program = desktop.start_saying(SMALL, &said);
+    desktop.hide_status(&mut program);
+    // Whole scene, a quarter to the right, parallel, a wide lens, a bit nearer by keys alone.
+    for key in ["Home", "3", "5", "0", "0", "0", "0"] {
+        desktop.xdotool(["key", key]);
+        pause(100);
+    }
+    desktop.xdotool(["keydown", "Left"]);
+    pause(200);
+    desktop.xdotool(["keyup", "Left"]);
+    pause(100);
+    desktop.xdotool(["key", "c"]);
+    // The notice goes.
+    pause(7000);
+    desktop.wait_until_done(&mut program);
+    let shown = desktop.shot(&program);
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+    let flags = std::fs::read_to_string(&said).unwrap();
+    assert!(flags.contains("--camera-orthographic") && flags.contains("--lens-radius"), "{flags}");
+    let rendered = desktop.directory.join("headless.png");
+    let status = desktop
+        .command(env!("CARGO_BIN_EXE_penumbra"))
+        .arg("render")
+        .args(SMALL)
+        .args(flags.split_whitespace())
+        .arg("-o")
+        .arg(&rendered)
+        .status();
+    assert!(status.unwrap().success());
+    let rendered = image::open(rendered).unwrap().to_rgb8();
+    assert!(colors(&rendered) > 50, "nothing is seen");
+    assert_eq!(difference(&rendered, &shown), 0.0);
+}
+
+#[test]
+fn views_of_pixels_and_cards_show_at_one_press_also_when_the_picture_rests() {
+    let Some(desktop) = desktop("views") else {
+        return;
+    };
+    let truth = desktop.directory.join("truth.exr");
+    let size = &SMALL[..2];
+    let mut render = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
+    let render = render.args(["render", "cornell", "--spp", "64", "-q"]).args(size).arg("-o").arg(&truth);
+    assert!(render.status().unwrap().success());
+    let reference = ["--reference", truth.to_str().unwrap()];
+    let mut program = desktop.start(&[SMALL, &reference].concat());
+    desktop.hide_status(&mut program);
+    let beauty = desktop.shot(&program);
+    let mut seen = vec![beauty.clone()];
+    // Noise, error, samples, boxes, triangles, normals, base colour, depth, not finite.
+    for view in 1..=9 {
+        desktop.xdotool(["key", "v"]);
+        pause(900);
+        // The notice stays for a while at the bottom.
+        let shown = image::imageops::crop_imm(&desktop.shot(&program), 0, 0, 320, 190).to_image();
+        let others = seen.iter().map(|s| image::imageops::crop_imm(s, 0, 0, 320, 190).to_image());
+        // Samples are as many everywhere, and boxes on the walls.
+        assert!(view == 3 || colors(&shown) > 1, "view {view} shows next to nothing");
+        assert!(others.into_iter().all(|other| difference(&shown, &other) > 0.05), "view {view} is another");
+        seen.push(desktop.shot(&program));
+    }
+    desktop.xdotool(["key", "v"]);
+    pause(7000);
+    assert_eq!(difference(&beauty, &desktop.shot(&program)), 0.0, "the picture is back");
+    for key in ["h", "g", "z"] {
+        desktop.xdotool(["key", key]);
+        pause(400);
+        assert!(difference(&beauty, &desktop.shot(&program)) > 0.05, "{key} shows nothing");
+        desktop.xdotool(["key", key]);
+        pause(400);
+    }
+}
+
+/// Pixels in which green is far above red and blue, and those in which red is above both.
+fn green_and_red(picture: &RgbImage) -> (usize, usize) {
+    let above = |a: u8, b: u8, c: u8| i32::from(a) > i32::from(b.max(c)) + 60;
+    let green = picture.pixels().filter(|p| above(p[1], p[0], p[2])).count();
+    let red = picture.pixels().filter(|p| above(p[0], p[1], p[2])).count();
+    (green, red)
+}
+
+#[test]
+fn a_pinned_pixel_shows_its_rays_and_boxes_show_the_hierarchy() {
+    let Some(desktop) = desktop("debug") else {
+        return;
+    };
+    let white = "[[model]]\nfile = 'floor.obj'\n[[light]]\nkind = 'parallelogram'\ncorner = [-1, 3, -1]\n\
+                 edge_u = [2, 0, 0]\nedge_v = [0, 0, 2]\nradiance = [1, 1, 1]\n[camera]\nposition = [0, 2, 6]\n\
+                 target = [0, 0.5, 0]\n";
+    let floor = "v -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nv -1 1 -1\nv 1 1 -1\nv 1 1 1\nv -1 1 1\n\
+                 f 1 4 3 2\nf 5 8 7 6\n";
+    std::fs::write(desktop.directory.join("scene.toml"), white).unwrap();
+    std::fs::write(desktop.directory.join("floor.obj"), floor).unwrap();
+    let mut program = desktop.start(&["scene.toml", "--resolution", "320x240", "--spp", "4"]);
+    desktop.hide_status(&mut program);
+    let plain = desktop.shot(&program);
+    assert!(green_and_red(&plain).0 < 10, "a grey scene");
+    // Without a mouse it is the pixel in the middle: on the roof, in full light.
+    desktop.xdotool(["key", "p"]);
+    pause(700);
+    let (green, red) = green_and_red(&desktop.shot(&program));
+    assert!(green > 30 && red < green / 4, "{green} green, {red} red");
+    // Below the roof all of the lamp is hidden.
+    desktop.xdotool(["mousemove", "--window", &program.window, "160", "165", "click", "1"]);
+    pause(700);
+    let (green, red) = green_and_red(&desktop.shot(&program));
+    assert!(red > 30 && green < red, "{green} green, {red} red");
+    // And all is gone again, but for the notice.
+    desktop.xdotool(["key", "p"]);
+    pause(7000);
+    assert_eq!(difference(&plain, &desktop.shot(&program)), 0.0);
+    desktop.xdotool(["key", "b"]);
+    pause(500);
+    assert!(difference(&plain, &desktop.shot(&program)) > 0.01, "a box around everything");
+}
+
+#[test]
+fn a_screenshot_is_made_again_from_what_it_says() {
+    let Some(desktop) = desktop("recipe") else {
+        return;
+    };
+    let mut program = desktop.start(SMALL);
+    desktop.hide_status(&mut program);
+    for key in ["Home", "t", "t", "period"] {
+        desktop.xdotool(["key", key]);
+        pause(100);
+    }
+    desktop.wait_until_done(&mut program);
+    desktop.xdotool(["key", "ctrl+F12"]);
+    let shot = wait_for("the file", || pictures_in(&desktop.directory).first().cloned());
+    desktop.xdotool(["key", "ctrl+q"]);
+    assert_eq!(program.wait().code(), Some(0));
+    let again = desktop.directory.join("again.png");
+    let mut render = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
+    let render = render.args(["render", "-q", "--from"]).arg(&shot).arg("-o").arg(&again);
+    assert!(render.status().unwrap().success());
+    let [shot, again] = [shot, again].map(|path| image::open(path).unwrap().to_rgb8());
+    assert!(colors(&shot) > 50);
+    assert_eq!(difference(&shot, &again), 0.0);
+}
+
+#[test]
+fn a_file_that_changes_is_loaded_again_with_the_camera_kept() {
+    let Some(desktop) = desktop("reload") else {
+        return;
+    };
+    let scene = "[[model]]\nfile = 'floor.obj'\n[[light]]\nkind = 'point'\nposition = [0, 3, 1]\n\
+                 intensity = [9, 9, 9]\n[camera]\nposition = [0, 2, 6]\ntarget = [0, 0, 0]\n";
+    let floor = "mtllib floor.mtl\nusemtl a\nv -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nf 1 4 3 2\n";
+    let write = |name: &str, text: &str| std::fs::write(desktop.directory.join(name), text).unwrap();
+    write("scene.toml", scene);
+    write("floor.obj", floor);
+    write("floor.mtl", "newmtl a\nKd 0.8 0.8 0.8\n");
+    let mut program = desktop.start(&["scene.toml", "--resolution", "320x240", "--spp", "4"]);
+    desktop.hide_status(&mut program);
+    let home = desktop.shot(&program);
+    desktop.xdotool(["key", "Home"]);
+    pause(300);
+    desktop.wait_until_done(&mut program);
+    let grey = desktop.shot(&program);
+    assert!(difference(&home, &grey) > 0.05, "the camera moves");
+    write("floor.mtl", "newmtl a\nKd 0.1 0.8 0.1\n");
+    wait_for("a green floor", || (green_and_red(&desktop.shot(&program)).0 > 1000).then_some(()));
+    // A broken file says so and changes nothing.
+    write("scene.toml", "[[model]]\nfile = 3\n");
+    pause(1500);
+    assert!(program.is_alive());
+    assert!(green_and_red(&desktop.shot(&program)).0 > 1000);
+    write("floor.mtl", "newmtl a\nKd 0.8 0.8 0.8\n");
+    write("scene.toml", scene);
+    pause(8000);
+    desktop.wait_until_done(&mut program);
+    assert_eq!(difference(&grey, &desktop.shot(&program)), 0.0, "the camera is where it was");
 }

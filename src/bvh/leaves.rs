@@ -86,6 +86,11 @@ impl Leaves {
         (0..count).map(move |i| Self::corners(rows, count, i))
     }
 
+    /// The triangles of a leaf, with their numbers.
+    pub fn numbered(&self, (first, count): (usize, usize)) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        self.ids[first..first + count].iter().copied().zip(self.triangles(first, count))
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.rows) + size_of_val(&*self.ids)
     }

@@ -10,6 +10,7 @@ pub mod blas;
 pub mod build;
 mod filter;
 mod found;
+pub mod inspect;
 mod leaves;
 mod merge;
 mod packet;

@@ -70,7 +70,7 @@ impl Placement {
 
     /// The same ray in local space. The direction is not normalised, so t stays what it is.
     #[inline(always)]
-    fn local(&self, ray: &Ray) -> Ray {
+    pub(super) fn local(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.local_from_world.transform_point3(ray.origin.as_dvec3()).as_vec3(),
             direction: self.local_from_world.transform_vector3(ray.direction.as_dvec3()).as_vec3(),

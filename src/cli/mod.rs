@@ -4,6 +4,7 @@ mod values;
 
 use crate::bvh::Isa;
 use crate::image::ToneMap;
+use crate::image::recipe::read_arguments;
 use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
 use crate::report::{GivenReference, ReportJob};
@@ -16,7 +17,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use values::{bytes, exposure, isa, noise, resolution, sample_range, seconds, time, vector, view_angle};
+use values::{
+    bytes, exposure, isa, length, noise, radius, resolution, sample_range, seconds, time, vector, view_angle,
+};
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
@@ -48,6 +51,17 @@ pub enum Command {
     Merge(MergeArgs),
     /// Measure speed and error over time, and write tables, curves and a page
     Report(ReportArgs),
+    /// Print a script that completes commands in a shell: penumbra completions bash > FILE
+    Completions(CompletionsArgs),
+    /// Print the manual page: penumbra man > penumbra.1
+    Man,
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// Whose
+    pub shell: clap_complete::Shell,
 }
 
 /// Arguments of the window.
@@ -62,11 +76,23 @@ pub struct WindowArgs {
     /// Name the built-in scenes
     #[arg(long)]
     pub list_scenes: bool,
+    /// Do what this file says, as if a user did it, and print the times from events to pictures as JSON
+    #[arg(long, value_name = "FILE")]
+    pub replay: Option<PathBuf>,
+    /// Write down what the user does, for --replay
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    pub record: Option<PathBuf>,
+    /// Keys of your own [default: penumbra/keys.toml in your folder of settings, such as ~/.config]
+    #[arg(long, value_name = "FILE.toml")]
+    pub keys: Option<PathBuf>,
 }
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct RenderArgs {
+    /// Make this screenshot again: scene, camera and look are what it says
+    #[arg(long, value_name = "SHOT.png", conflicts_with = "scene")]
+    pub from: Option<PathBuf>,
     /// Scene and look.
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -76,7 +102,7 @@ pub struct RenderArgs {
 }
 
 /// Where a headless render goes and when it ends.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct OutputArgs {
     /// File to write: .png (developed), .exr (linear) or .film (to --resume or merge); may be given several
     /// times [default: SCENE.png, or nothing with --json]
@@ -94,8 +120,8 @@ pub struct OutputArgs {
     /// Go on with this film; N of --spp counts what it holds
     #[arg(long, value_name = "FILM")]
     pub resume: Option<PathBuf>,
-    /// Picture (.exr best) or film to measure the true error by
-    #[arg(long, value_name = "FILE", requires = "error_log")]
+    /// Picture (.exr best) or film to measure the true error by, in the window or for --error-log
+    #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
     /// Table of true error against seconds and samples
     #[arg(long, value_name = "FILE.csv", requires = "reference")]
@@ -165,6 +191,15 @@ pub struct SceneArgs {
     /// Vertical field of view in degrees
     #[arg(long, value_name = "DEG", value_parser = view_angle)]
     pub camera_view_angle: Option<f32>,
+    /// Look in parallel, with this height of the picture in scene units
+    #[arg(long, value_name = "HEIGHT", value_parser = length, conflicts_with = "camera_view_angle")]
+    pub camera_orthographic: Option<f32>,
+    /// Radius of the lens in scene units: what is not in focus is blurred; 0 for none
+    #[arg(long, value_name = "R", value_parser = radius)]
+    pub lens_radius: Option<f32>,
+    /// Distance of what is sharp along the line of sight [default: that of the focal point]
+    #[arg(long, value_name = "D", value_parser = length)]
+    pub focus_distance: Option<f32>,
     /// Exposure in stops
     #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true)]
     pub exposure: Option<f32>,
@@ -350,6 +385,10 @@ pub enum ToneMapArg {
     Clip,
     /// Khronos PBR Neutral.
     Neutral,
+    /// As film does: bright colours fade to white.
+    Agx,
+    /// ACES, by its usual fit.
+    Aces,
 }
 
 impl IntegratorArg {
@@ -366,7 +405,34 @@ impl From<ToneMapArg> for ToneMap {
         match arg {
             ToneMapArg::Clip => Self::Clip,
             ToneMapArg::Neutral => Self::Neutral,
+            ToneMapArg::Agx => Self::AgX,
+            ToneMapArg::Aces => Self::Aces,
         }
+    }
+}
+
+/// The scene and the look that a picture's recipe says.
+#[derive(Debug, Parser)]
+struct RecipeArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+impl RenderArgs {
+    /// The scene and the look: those of `--from`, or those given.
+    ///
+    /// # Errors
+    /// If there is no such picture, or it doesn't say.
+    pub fn scene(self) -> Result<SceneArgs, String> {
+        let Some(path) = self.from else { return Ok(self.scene) };
+        let arguments = read_arguments(&path).map_err(|error| error.to_string())?;
+        let wrong = |error: clap::Error| {
+            let text = error.to_string();
+            let line = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+            format!("{}: its recipe is not for this version: {line}", path.display())
+        };
+        let arguments = std::iter::once("penumbra".to_owned()).chain(arguments);
+        Ok(RecipeArgs::try_parse_from(arguments).map_err(wrong)?.scene)
     }
 }
 
@@ -415,6 +481,9 @@ impl SceneArgs {
                 focal_point: self.camera_focal_point,
                 view_up: self.camera_view_up,
                 view_angle: self.camera_view_angle,
+                orthographic: self.camera_orthographic,
+                lens_radius: self.lens_radius,
+                focus_distance: self.focus_distance,
             },
         }
     }

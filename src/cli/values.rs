@@ -42,6 +42,15 @@ pub(super) fn view_angle(text: &str) -> Result<f32, String> {
     }
 }
 
+pub(super) fn length(text: &str) -> Result<f32, String> {
+    let length: f32 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if length > 0.0 && length.is_finite() { Ok(length) } else { Err("must be above 0".to_owned()) }
+}
+
+pub(super) fn radius(text: &str) -> Result<f32, String> {
+    if text.parse() == Ok(0.0) { Ok(0.0) } else { length(text) }
+}
+
 pub(super) fn exposure(text: &str) -> Result<f32, String> {
     let stops: f32 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
     if stops.abs() <= 100.0 { Ok(stops) } else { Err("must lie within -100 to 100 stops".to_owned()) }

@@ -73,17 +73,14 @@ impl Header {
     /// Of a picture shown like this.
     #[must_use]
     pub fn new(identity: Identity, planned: Option<Range<u32>>, display: &Display) -> Self {
-        let tone_map = match display.tone_map {
-            ToneMap::Clip => "clip",
-            ToneMap::Neutral => "neutral",
-        };
+        let tone_map = display.tone_map.name();
         Self { identity, planned, exposure: display.exposure, tone_map: tone_map.to_owned() }
     }
 
     /// How it is shown.
     #[must_use]
     pub fn display(&self) -> Display {
-        let tone_map = if self.tone_map == "neutral" { ToneMap::Neutral } else { ToneMap::Clip };
+        let tone_map = ToneMap::named(&self.tone_map).unwrap_or_default();
         Display { exposure: self.exposure, tone_map }
     }
 }

@@ -1,5 +1,7 @@
 //! Linear radiance → bytes on a screen: exposure, tone map, sRGB, dither. Never touches the film.
 
+use super::compare::LinearImage;
+use super::tone_map::ToneMap;
 use crate::scene::color::{luminance, srgb_from_linear};
 use crate::trace::Film;
 use crate::trace::sampler::{hash, unit_float};
@@ -17,16 +19,6 @@ pub struct Display {
     pub tone_map: ToneMap,
 }
 
-/// What happens above white.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ToneMap {
-    /// Cut off, each channel for itself.
-    #[default]
-    Clip,
-    /// Khronos PBR Neutral: colours stay, highlights roll off.
-    Neutral,
-}
-
 /// A developed picture.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Picture {
@@ -38,25 +30,28 @@ pub struct Picture {
     pub version: u64,
 }
 
-impl ToneMap {
-    /// Maps exposed linear radiance to linear display values; what is still outside 0..=1 clips.
-    ///
-    /// Neutral: Khronos PBR Neutral tone mapper specification, 2024.
-    #[must_use]
-    pub fn apply(self, color: Vec3) -> Vec3 {
-        match self {
-            Self::Clip => color,
-            Self::Neutral => neutral(color),
-        }
-    }
-}
-
 /// An exposure for a picture that is much too dark or too bright at 0 EV; `None` if it is all black.
 ///
-/// The 90th percentile of the luminance of what is not black goes to 0.7, in thirds of a stop, if it
-/// lies outside of 0.03 to 3: a picture that is roughly right stays as its author made it.
+/// As [`exposure_for`], if what that goes by lies outside of 0.03 to 3: a picture that is roughly right stays
+/// as its author made it.
 #[must_use]
 pub fn suggest_exposure(film: &Film) -> Option<f32> {
+    let bright = bright(film)?;
+    Some(if (0.03..=3.0).contains(&bright) { 0.0 } else { exposing(bright) })
+}
+
+/// The exposure that brings the 90th percentile of the luminance of what is not black to 0.7, in thirds of
+/// a stop; `None` if all is black.
+#[must_use]
+pub fn exposure_for(film: &Film) -> Option<f32> {
+    bright(film).map(exposing)
+}
+
+fn exposing(bright: f32) -> f32 {
+    ((0.7 / bright).log2() * 3.0).round() / 3.0
+}
+
+fn bright(film: &Film) -> Option<f32> {
     let mut lit: Vec<f32> = (0..film.size().y)
         .flat_map(|y| film.row(y))
         .map(|pixel| luminance(pixel.mean().as_vec3()))
@@ -66,9 +61,7 @@ pub fn suggest_exposure(film: &Film) -> Option<f32> {
         return None;
     }
     let rank = (lit.len() - 1) * 9 / 10;
-    let bright = *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
-    let stops = (0.7 / bright).log2();
-    Some(if (0.03..=3.0).contains(&bright) { 0.0 } else { (stops * 3.0).round() / 3.0 })
+    Some(*lit.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 /// The film as sRGB bytes, RGBA, rows from the top.
@@ -106,6 +99,22 @@ pub fn develop(film: &Film, coarse: Option<&Film>, display: &Display) -> Vec<u8>
     bytes
 }
 
+/// A linear picture as bytes, in the same way.
+#[must_use]
+pub fn develop_image(image: &LinearImage, display: &Display) -> Vec<u8> {
+    let mut film = Film::new(image.size, 0);
+    let width = image.size.x;
+    for tile in film.tiles_mut() {
+        let (origin, across) = (tile.origin, tile.size.x);
+        for (i, pixel) in (0..).zip(tile.pixels_mut()) {
+            let place = origin + UVec2::new(i % across, i / across);
+            // What is no light stays black.
+            pixel.add(0, image.pixels.get((place.y * width + place.x) as usize).copied().unwrap_or_default());
+        }
+    }
+    develop(&film, None, display)
+}
+
 /// [`srgb_from_linear`] times 255 as a table over the square root, in which it is nearly straight: linear
 /// between 4,097 entries it is off by less than 0.001 levels, at a tenth of the cost.
 struct SrgbLevels([f32; 4098]);
@@ -120,23 +129,6 @@ impl SrgbLevels {
         let index = place as usize;
         self.0[index] + (self.0[index + 1] - self.0[index]) * (place - index as f32)
     }
-}
-
-fn neutral(color: Vec3) -> Vec3 {
-    const START: f32 = 0.8 - 0.04;
-    const DESATURATION: f32 = 0.15;
-    let low = color.min_element();
-    let offset = if low < 0.08 { low - 6.25 * low * low } else { 0.04 };
-    let color = color - offset;
-    let peak = color.max_element();
-    if peak < START {
-        return color;
-    }
-    let d = 1.0 - START;
-    let new_peak = 1.0 - d * d / (peak + d - START);
-    let color = color * (new_peak / peak);
-    let g = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
-    color.lerp(Vec3::splat(new_peak), g)
 }
 
 #[cfg(test)]
@@ -157,11 +149,11 @@ mod tests {
         for (radiance, byte) in [(0.0, 0), (1e30, 255), (f32::MAX, 255), (-1.0, 0)] {
             let mut film = Film::new(UVec2::ONE, 0);
             film.tiles_mut()[0].pixels_mut()[0].add(0, Vec3::splat(radiance.min(1e10)));
-            for tone_map in [ToneMap::Clip, ToneMap::Neutral] {
+            for tone_map in ToneMap::ALL {
                 let bytes = develop(&film, None, &Display { exposure: 20.0, tone_map });
-                // The neutral curve only nears white; dither may take the last level.
+                // The curves only near white; dither may take the last level.
                 assert!(
-                    bytes[0].abs_diff(byte) <= u8::from(tone_map == ToneMap::Neutral),
+                    bytes[0].abs_diff(byte) <= u8::from(tone_map != ToneMap::Clip),
                     "{radiance} {tone_map:?}: {bytes:?}"
                 );
             }

@@ -20,7 +20,7 @@ mod ktx2;
 mod obj;
 mod picture;
 mod report;
-mod settings;
+pub mod settings;
 mod source;
 
 pub use builtin::{BuiltIn, built_in_scenes};
@@ -149,6 +149,9 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     }
     for settings in &settings {
         settings.spawn_lights(sink)?;
+    }
+    for settings in &settings {
+        settings.apply_edits(sink)?;
     }
     sink.begin(Phase::Framing);
     pose(sink.world);

@@ -25,6 +25,15 @@ pub enum Projection {
     },
 }
 
+/// A lens with an extent, on a [`Camera`]'s entity: what is not in focus is blurred. Without it all is sharp.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Radius of its opening in scene units, above 0.
+    pub radius: f32,
+    /// Distance of the plane that is sharp, along the line of sight, scene units, above 0.
+    pub focus: f32,
+}
+
 impl Default for Camera {
     /// 45 degrees.
     fn default() -> Self {

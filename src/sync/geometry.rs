@@ -1,8 +1,8 @@
 //! Instances → the top level of the hierarchy.
 
-use super::{Instructions, MaterialNumbers, MeshBlas, Redone, RenderOrigin};
+use super::{Entities, Instructions, MaterialNumbers, MeshBlas, Redone, RenderOrigin};
 use crate::bvh::{Placement, Tlas};
-use crate::scene::{GlobalTransform, Instance, Mesh};
+use crate::scene::{GlobalTransform, Hidden, Instance, Mesh};
 use crate::trace::Geometry;
 use crate::trace::scene::InstanceData;
 use bevy_ecs::prelude::*;
@@ -48,15 +48,16 @@ pub fn sync_geometry(
     origin: Res<RenderOrigin>,
     numbers: Res<MaterialNumbers>,
     instructions: Res<Instructions>,
-    instances: Query<(Entity, &Instance, &GlobalTransform)>,
+    instances: Query<(Entity, &Instance, &GlobalTransform), Without<Hidden>>,
     meshes: Query<(&Mesh, &MeshBlas)>,
+    mut entities: ResMut<Entities>,
     changed: (
-        Query<(), (With<Instance>, Or<(Changed<Instance>, Changed<GlobalTransform>)>)>,
+        Query<(), (With<Instance>, Or<(Changed<Instance>, Changed<GlobalTransform>, Changed<Hidden>)>)>,
         Query<(), Changed<MeshBlas>>,
     ),
-    mut removed: (RemovedComponents<Instance>, RemovedComponents<MeshBlas>),
+    mut removed: (RemovedComponents<Instance>, RemovedComponents<MeshBlas>, RemovedComponents<Hidden>),
 ) {
-    let removed = removed.0.read().count() + removed.1.read().count();
+    let removed = removed.0.read().count() + removed.1.read().count() + removed.2.read().count();
     let unchanged = changed.0.is_empty() && changed.1.is_empty() && removed == 0;
     // Values of materials don't matter here, only which numbers they have.
     if unchanged && !numbers.is_changed() && !instructions.is_changed() {
@@ -65,10 +66,12 @@ pub fn sync_geometry(
     let mut placed: Vec<_> = instances.iter().collect();
     placed.sort_unstable_by_key(|(entity, ..)| *entity);
     let (mut placements, mut data) = (Vec::new(), Vec::new());
-    for (_, instance, global) in placed {
+    entities.instances.clear();
+    for (entity, instance, global) in placed {
         let Ok((mesh, MeshBlas(blas))) = meshes.get(instance.mesh) else { continue };
         let render_from_local = origin.render_from(global);
         let Some(placement) = Placement::new(Arc::clone(blas), render_from_local) else { continue };
+        entities.instances.push(entity);
         placements.push(placement);
         data.push(InstanceData {
             mesh: Arc::clone(&mesh.0),

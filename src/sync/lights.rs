@@ -1,8 +1,8 @@
 //! Lights and whatever emits → the light list.
 
-use super::{Redone, RenderOrigin};
+use super::{Entities, Redone, RenderOrigin};
 use crate::scene::color::luminance;
-use crate::scene::{GlobalTransform, Light, Material, TriangleMesh, Visible};
+use crate::scene::{GlobalTransform, Hidden, Light, Material, TriangleMesh, Visible};
 use crate::trace::light::FlatLight;
 use crate::trace::mesh_light::{MeshLight, triangle_area};
 use crate::trace::quad::Quad;
@@ -12,6 +12,7 @@ use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, Vec3};
 
+#[expect(clippy::too_many_arguments, reason = "all that may emit")]
 /// Makes the light list anew when a light changed, or something that emits may have.
 pub fn sync_lights(
     mut lights: ResMut<Lights>,
@@ -19,20 +20,28 @@ pub fn sync_lights(
     origin: Res<RenderOrigin>,
     geometry: Res<Geometry>,
     surfaces: Res<Surfaces>,
-    all: Query<(Entity, &Light, &GlobalTransform, Option<&Visible>)>,
-    changed: Query<(), (With<Light>, Or<(Changed<Light>, Changed<GlobalTransform>, Changed<Visible>)>)>,
-    mut removed: (RemovedComponents<Light>, RemovedComponents<Visible>),
+    all: Query<(Entity, &Light, &GlobalTransform, Option<&Visible>), Without<Hidden>>,
+    changed: Query<
+        (),
+        (With<Light>, Or<(Changed<Light>, Changed<GlobalTransform>, Changed<Visible>, Changed<Hidden>)>),
+    >,
+    mut entities: ResMut<Entities>,
+    mut removed: (RemovedComponents<Light>, RemovedComponents<Visible>, RemovedComponents<Hidden>),
 ) {
-    let removed = removed.0.read().count() + removed.1.read().count();
+    let removed = removed.0.read().count() + removed.1.read().count() + removed.2.read().count();
     if changed.is_empty() && removed == 0 && !geometry.is_changed() && !surfaces.is_changed() {
         return;
     }
     let mut placed: Vec<_> = all.iter().collect();
     placed.sort_unstable_by_key(|(entity, ..)| *entity);
-    let mut flat: Vec<FlatLight> = placed
-        .into_iter()
-        .filter_map(|(_, light, global, visible)| flatten(light, &origin.render_from(global), visible))
-        .collect();
+    entities.lights.clear();
+    let mut flat: Vec<FlatLight> = Vec::new();
+    for (entity, light, global, visible) in placed {
+        if let Some(light) = flatten(light, &origin.render_from(global), visible) {
+            entities.lights.push(entity);
+            flat.push(light);
+        }
+    }
     let mut meshes = Vec::new();
     for (instance, data) in (0..).zip(&geometry.instances) {
         let placement = geometry.tlas.placements()[instance as usize].world_from_local();

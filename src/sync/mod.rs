@@ -21,7 +21,7 @@ pub use meshes::{BlasCache, MeshBlas, build_blas};
 pub use surfaces::{MaterialNumbers, sync_coverage, sync_surfaces};
 
 use crate::bvh::Isa;
-use crate::scene::{ActiveCamera, Camera, GlobalTransform};
+use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens};
 use crate::trace::{Coverage, Film, Geometry, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3};
@@ -56,6 +56,15 @@ impl RenderOrigin {
     }
 }
 
+/// Which entities the flat arrays come from.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Entities {
+    /// Of each instance.
+    pub instances: Vec<Entity>,
+    /// Of each light that is not an emissive instance: those come first.
+    pub lights: Vec<Entity>,
+}
+
 /// What rays are traced with: the machine's widest, unless somebody wants another.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instructions(pub Isa);
@@ -82,10 +91,11 @@ pub fn sync_viewpoint(
     mut viewpoint: ResMut<Viewpoint>,
     origin: Res<RenderOrigin>,
     active: Option<Res<ActiveCamera>>,
-    cameras: Query<(&Camera, &GlobalTransform)>,
+    cameras: Query<(&Camera, &GlobalTransform, Option<&Lens>)>,
 ) {
-    if let Some((camera, global)) = active.and_then(|a| cameras.get(a.0).ok()) {
-        viewpoint.set_if_neq(Viewpoint::new(&origin.render_from(global), camera.projection));
+    if let Some((camera, global, lens)) = active.and_then(|a| cameras.get(a.0).ok()) {
+        let pinhole = Viewpoint::new(&origin.render_from(global), camera.projection);
+        viewpoint.set_if_neq(pinhole.with_lens(lens.copied()));
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::block::{LANES, Row, Rows};
 use super::sampler::SamplerRow;
+use super::warp::disk;
 use crate::bvh::Ray;
 use crate::bvh::simd::{Job, Simd};
-use crate::scene::Projection;
+use crate::scene::{Lens, Projection};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DVec3, UVec2, Vec2, Vec3};
 
@@ -19,6 +20,8 @@ pub struct Viewpoint {
     /// Half the picture's height: at unit distance if in perspective, else in scene units.
     half_height: f32,
     perspective: bool,
+    /// `None`: a pinhole, all is sharp.
+    lens: Option<Lens>,
 }
 
 impl Default for Viewpoint {
@@ -49,18 +52,36 @@ impl Viewpoint {
                 Projection::Orthographic { height } => 0.5 * height,
             },
             perspective: matches!(projection, Projection::Perspective { .. }),
+            lens: None,
         }
+    }
+
+    /// The same behind `lens`; one without an extent or a distance is none.
+    #[must_use]
+    pub fn with_lens(self, lens: Option<Lens>) -> Self {
+        let lens = lens.filter(|lens| {
+            let [radius, focus] = [lens.radius, lens.focus];
+            radius > 0.0 && focus > 0.0 && radius.is_finite() && focus.is_finite()
+        });
+        Self { lens, ..self }
+    }
+
+    /// Whether rays through one point of the picture begin at several.
+    #[must_use]
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
     }
 
     /// In words, every bit of it, at its place in the world: `origin` is that of render space.
     #[must_use]
     pub fn description(&self, origin: DVec3) -> String {
-        let Self { origin: eye, right, up, back, half_height, perspective } = self;
+        let Self { origin: eye, right, up, back, half_height, perspective, lens } = self;
         let kind = if *perspective { "perspective" } else { "orthographic" };
         let eye = eye.as_dvec3() + origin;
         let [eye, ahead] = [eye.to_array(), (-back.as_dvec3()).to_array()];
         let [up, right] = [up, right].map(Vec3::to_array);
-        format!("{kind} {half_height:?} at {eye:?} toward {ahead:?} up {up:?} right {right:?}")
+        let lens = lens.map_or(String::new(), |l| format!(" lens {:?} focus {:?}", l.radius, l.focus));
+        format!("{kind} {half_height:?} at {eye:?} toward {ahead:?} up {up:?} right {right:?}{lens}")
     }
 
     /// The ray through `point`, in pixels from the top left of a picture of `size`; unit direction.
@@ -79,7 +100,38 @@ impl Viewpoint {
             Ray::new(self.origin + offset, -self.back)
         }
     }
+
+    /// A [`Viewpoint::ray`] from the point of the lens that `random` in [0, 1)² chooses, if there is a lens.
+    #[must_use]
+    pub fn through_lens(&self, ray: Ray, random: Vec2) -> Ray {
+        let Some(lens) = self.lens else { return ray };
+        let on_lens = disk(random) * lens.radius;
+        let sharp = ray.at(lens.focus / -ray.direction.dot(self.back));
+        let origin = ray.origin + self.right * on_lens.x + self.up * on_lens.y;
+        Ray::new(origin, (sharp - origin).normalize())
+    }
+
+    /// Where `point` of render space is in a picture of `size`, in pixels from the top left, and how deep:
+    /// its distance along the line of sight, which is 0 or less behind the eye.
+    #[must_use]
+    pub fn project(&self, point: Vec3, size: UVec2) -> Vec3 {
+        let offset = point - self.origin;
+        let depth = -self.back.dot(offset);
+        let size = size.as_vec2();
+        let scale = 0.5 * size.y / (self.half_height * if self.perspective { depth } else { 1.0 });
+        let (x, y) = (self.right.dot(offset) * scale, self.up.dot(offset) * scale);
+        Vec3::new(0.5 * size.x + x, 0.5 * size.y - y, depth)
+    }
+
+    /// How deep a point of `ray` at `t` is, as [`Viewpoint::project`] measures it.
+    #[must_use]
+    pub fn depth(&self, ray: &Ray, t: f32) -> f32 {
+        -self.back.dot(ray.at(t) - self.origin)
+    }
 }
+
+/// The pair of random numbers that chooses the place on the lens; that of the place in the pixel is 0.
+pub(super) const LENS: u32 = 1;
 
 /// Rays through the pixels with these top left `corners`, each at a place of its own in the pixel.
 pub(super) struct Look<'a> {
@@ -98,15 +150,80 @@ impl Job for Look<'_> {
     fn run<S: Simd>(self, _: S) {
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         self.samplers.pairs(0, &mut x, &mut y);
+        let (mut lens_x, mut lens_y) = ([0.0; LANES], [0.0; LANES]);
+        let has_lens = self.viewpoint.has_lens();
+        if has_lens {
+            self.samplers.pairs(LENS, &mut lens_x, &mut lens_y);
+        }
         let (mut origins, mut directions) = (Rows::blank(), Rows::blank());
         for i in 0..LANES {
             let point = Vec2::new(self.corners[0][i] + x[i], self.corners[1][i] + y[i]);
-            let ray = self.viewpoint.ray(point, self.size);
+            let mut ray = self.viewpoint.ray(point, self.size);
+            if has_lens {
+                ray = self.viewpoint.through_lens(ray, Vec2::new(lens_x[i], lens_y[i]));
+            }
             origins.set(i, ray.origin);
             directions.set(i, ray.direction);
         }
         for (i, ray) in self.rays.iter_mut().enumerate() {
             *ray = Ray::new(origins.get(i), directions.get(i));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn viewpoint(projection: Projection) -> Viewpoint {
+        let pose = crate::scene::Transform::looking_at(DVec3::new(1.0, 2.0, 3.0), DVec3::ZERO, DVec3::Y);
+        Viewpoint::new(&pose.0, projection)
+    }
+
+    const BOTH: [Projection; 2] =
+        [Projection::Perspective { vertical_fov: 0.9 }, Projection::Orthographic { height: 3.0 }];
+
+    #[test]
+    fn a_point_on_a_ray_is_projected_to_where_the_ray_began() {
+        let size = UVec2::new(640, 360);
+        for viewpoint in BOTH.map(viewpoint) {
+            for (x, y, t) in [(0.0, 0.0, 1.0), (320.0, 180.0, 4.0), (639.5, 12.25, 0.3)] {
+                let ray = viewpoint.ray(Vec2::new(x, y), size);
+                let there = viewpoint.project(ray.at(t), size);
+                assert!(there.abs_diff_eq(Vec3::new(x, y, viewpoint.depth(&ray, t)), 2e-3), "{there}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_rays_of_a_lens_meet_where_it_is_sharp_and_nowhere_else() {
+        let size = UVec2::new(64, 64);
+        for pinhole in BOTH.map(viewpoint) {
+            let lens = Lens { radius: 0.25, focus: 2.0 };
+            let viewpoint = pinhole.with_lens(Some(lens));
+            let place = Vec2::new(10.0, 50.0);
+            let sharp = pinhole.ray(place, size);
+            let t = 2.0 / pinhole.depth(&sharp, 1.0);
+            let (mut widest, mut seen) = (0f32, 0);
+            for i in 0..256u32 {
+                let random = Vec2::new((i % 16) as f32 + 0.5, (i / 16) as f32 + 0.5) / 16.0;
+                let ray = viewpoint.through_lens(viewpoint.ray(place, size), random);
+                let near = (sharp.at(t) - ray.origin).reject_from(ray.direction).length();
+                assert!(near < 1e-5, "{near}");
+                assert!((ray.direction.length() - 1.0).abs() < 1e-6);
+                let off = (ray.origin - sharp.origin).length();
+                assert!(off <= 0.25 * 1.0001, "{off}");
+                (widest, seen) = (widest.max(off), seen + u32::from(off < 0.125));
+            }
+            assert!(widest > 0.24 && (56..=72).contains(&seen), "even by area: {widest} {seen}");
+        }
+    }
+
+    #[test]
+    fn a_lens_without_extent_is_none() {
+        for (radius, focus) in [(0.0, 1.0), (1.0, 0.0), (f32::NAN, 1.0), (1.0, f32::INFINITY)] {
+            let pinhole = viewpoint(BOTH[0]);
+            assert_eq!(pinhole.with_lens(Some(Lens { radius, focus })), pinhole);
         }
     }
 }

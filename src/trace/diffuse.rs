@@ -54,8 +54,10 @@ impl Diffuse {
     /// Begins with another batch.
     pub(super) fn enter(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2) {
         let window = Window::new(scene, tile, size);
-        self.lights_in_view = scene.lights.any_shape(|bounds| !window.hides(&bounds));
-        self.window = (scene.settings.shafts && scene.lights.samples_all(0)).then_some(window);
+        // Through a lens one sees more than through a point.
+        let is_sharp = !scene.viewpoint.has_lens();
+        self.lights_in_view = !is_sharp || scene.lights.any_shape(|bounds| !window.hides(&bounds));
+        self.window = (is_sharp && scene.settings.shafts && scene.lights.samples_all(0)).then_some(window);
         self.sightlines = std::mem::take(&mut tile.sightlines);
         self.sightlines.tidy();
         self.asked.clear();

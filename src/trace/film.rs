@@ -179,6 +179,12 @@ impl Tile {
         (f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32
     }
 
+    /// Index of the sample that comes next in a pixel: what is missing below it was dropped.
+    #[must_use]
+    pub fn next_of(&self, pixel: usize) -> u32 {
+        self.next_sample + self.more.get(pixel).copied().unwrap_or(0)
+    }
+
     /// Rows from the top, to look at.
     pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
         self.pixels.iter().map(|pixel| if self.stale { &EMPTY } else { pixel })

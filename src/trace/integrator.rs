@@ -98,7 +98,8 @@ pub struct Batch {
     keys: Vec<(u32, u32)>,
 }
 
-/// Dimensions of the sampler: pair 0 is the place in the pixel, then this many pairs a bounce.
+/// Dimensions of the sampler: pair 0 is the place in the pixel, 1 that on the lens; a bounce has this many pairs
+/// from 1 on, of which it does not use the first.
 pub(super) const PAIRS_PER_BOUNCE: u32 = 32;
 pub(super) const LOBE: u32 = 1;
 pub(super) const DIRECTION: u32 = 2;
@@ -320,7 +321,7 @@ impl Batch {
     }
 
     /// Queues shadow rays to lights, and the ray that goes on.
-    fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
+    pub(super) fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
         let bsdf = at.bsdf(scene, surface);
         let wo = -path.ray.direction;
         let base = 1 + path.depth * PAIRS_PER_BOUNCE;

@@ -14,7 +14,23 @@ use glam::{DVec3, UVec2};
 /// How far from a pixel its surroundings reach.
 const AROUND: usize = 3;
 
-/// Estimated relative error of the picture's luminance, 0.02 for 2 %.
+/// An estimated relative error, and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// 0.02 for 2 %.
+    pub relative: f64,
+    /// Half the interval around it that holds the true error of 95 of 100 pictures: twice the scatter of the
+    /// estimate and of the error itself, each of which is one draw. As far as squared pixel errors are of normal ones.
+    pub doubt: f64,
+}
+
+/// Estimated relative error of the picture's luminance, 0.02 for 2 %: see [`estimate`].
+#[must_use]
+pub fn relative_noise(film: &Film) -> Option<f64> {
+    estimate(film).map(|noise| noise.relative)
+}
+
+/// Estimated relative error of the picture's luminance.
 ///
 /// The film's halves A and B are independent, so (A − B) / 2 has the variance of their mean: it stands for the
 /// error. Pixels that are dark in every sample count as exact.
@@ -22,7 +38,7 @@ const AROUND: usize = 3;
 /// `None` before both halves have a sample, or when all is black. It knows nothing of light that no
 /// sample has seen yet.
 #[must_use]
-pub fn relative_noise(film: &Film) -> Option<f64> {
+pub fn estimate(film: &Film) -> Option<Noise> {
     let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
     let size = film.size();
     let count = size.element_product() as usize;
@@ -34,7 +50,26 @@ pub fn relative_noise(film: &Film) -> Option<f64> {
             errors.push(0.5 * (a - b));
         }
     }
-    relative(&errors, &picture, size)
+    let squares = squares(&errors, &picture, size)?;
+    let (sum, fourth) = squares.iter().fold((0.0, 0.0), |(sum, fourth), x| (sum + x, fourth + x * x));
+    let relative = (sum / squares.len() as f64).sqrt();
+    // Of a squared normal error x, E x² = 3 (E x)²; the root halves a relative scatter.
+    let scatter = if sum > 0.0 { 0.5 * (2.0 / 3.0 * fourth).sqrt() / sum } else { 0.0 };
+    Some(Noise { relative, doubt: relative * 1.96 * std::f64::consts::SQRT_2 * scatter })
+}
+
+/// Relative error of each pixel by the same estimate, rows from the top; 0 where both halves are black. Empty if
+/// the picture is not ready for it.
+#[must_use]
+pub fn map(film: &Film) -> Vec<f32> {
+    let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
+    let pixels = || (0..film.size().y).flat_map(|y| film.row(y));
+    let errors: Option<Vec<f64>> = pixels()
+        .map(|pixel| Some(0.5 * (brightness(pixel.half_mean(0)?) - brightness(pixel.half_mean(1)?))))
+        .collect();
+    let picture: Vec<f64> = pixels().map(|pixel| brightness(pixel.mean())).collect();
+    let squares = errors.and_then(|errors| squares(&errors, &picture, film.size()));
+    squares.unwrap_or_default().into_iter().map(|x| x.sqrt() as f32).collect()
 }
 
 /// What [`relative_noise`] estimates: the error of a picture against the truth, both as luminances in rows
@@ -46,6 +81,12 @@ pub fn relative_error(picture: &[f64], truth: &[f64], size: UVec2) -> Option<f64
 }
 
 fn relative(errors: &[f64], brightness: &[f64], size: UVec2) -> Option<f64> {
+    let squares = squares(errors, brightness, size)?;
+    Some((squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// Squared relative error of each pixel.
+fn squares(errors: &[f64], brightness: &[f64], size: UVec2) -> Option<Vec<f64>> {
     let mut lit: Vec<f64> = brightness.iter().copied().filter(|&i| i > 0.0).collect();
     if lit.is_empty() {
         return None;
@@ -54,8 +95,7 @@ fn relative(errors: &[f64], brightness: &[f64], size: UVec2) -> Option<f64> {
     let median = *lit.select_nth_unstable_by(middle, f64::total_cmp).1;
     let floor = (0.1 * median).powi(2);
     let around = means_around(brightness, size);
-    let sum: f64 = errors.iter().zip(around).map(|(e, l)| e * e / (l * l + floor)).sum();
-    Some((sum / errors.len() as f64).sqrt())
+    Some(errors.iter().zip(around).map(|(e, l)| e * e / (l * l + floor)).collect())
 }
 
 /// Means over squares around each pixel, as far as they lie in the picture: first along rows, then columns.
@@ -110,5 +150,50 @@ mod tests {
         let error = relative_error(&picture, &truth, UVec2::new(20, 5)).unwrap();
         assert!((error - 0.1 / 1.01f64.sqrt()).abs() < 1e-9, "{error}");
         assert_eq!(relative_error(&picture, &vec![0.0; 100], UVec2::new(20, 5)), None);
+    }
+
+    /// Sixteen samples a pixel of a grey picture, with normal errors; and the true relative error.
+    fn noisy(seed: u32, size: UVec2) -> (Film, f64) {
+        use crate::trace::sampler::{hash, unit_float};
+        let mut film = Film::new(size, 0);
+        let mut counter = hash(seed);
+        let mut normal = || {
+            let mut sum = 0.0;
+            for _ in 0..12 {
+                counter = counter.wrapping_add(1);
+                sum += unit_float(hash(counter));
+            }
+            sum - 6.0
+        };
+        for tile in film.tiles_mut() {
+            for pixel in tile.pixels_mut() {
+                for i in 0..16 {
+                    pixel.add(i, glam::Vec3::splat(10.0 + normal()));
+                }
+            }
+        }
+        let picture: Vec<f64> = (0..size.y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean().x).collect();
+        let error = relative_error(&picture, &vec![10.0; picture.len()], size).unwrap();
+        (film, error)
+    }
+
+    #[test]
+    fn the_interval_holds_the_true_error_of_nineteen_pictures_in_twenty() {
+        let inside = (0..400).filter(|&seed| {
+            let (film, error) = noisy(seed, UVec2::new(24, 16));
+            let noise = estimate(&film).unwrap();
+            (error - noise.relative).abs() <= noise.doubt
+        });
+        // 380 are expected, with a standard deviation of 4.4.
+        let count = inside.count();
+        assert!((362..=398).contains(&count), "{count} of 400");
+    }
+
+    #[test]
+    fn the_map_is_of_the_number() {
+        let (film, _) = noisy(1, UVec2::new(24, 16));
+        let map = map(&film);
+        let mean = map.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>() / map.len() as f64;
+        assert!((mean.sqrt() / relative_noise(&film).unwrap() - 1.0).abs() < 1e-6);
     }
 }

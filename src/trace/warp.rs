@@ -59,6 +59,13 @@ fn one_minus_cos(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())
 }
 
+/// Uniform in the unit disk.
+#[must_use]
+pub fn disk(u: Vec2) -> Vec2 {
+    let (y, x) = (2.0 * PI * u.y).sin_cos();
+    Vec2::new(x, y) * u.x.sqrt()
+}
+
 /// Uniform over all directions.
 #[must_use]
 pub fn uniform_sphere(u: Vec2) -> Vec3 {

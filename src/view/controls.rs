@@ -1,12 +1,15 @@
 //! Keys that change how the picture is made or shown, and what they answer.
 
-use super::fly::camera_flags;
+use super::flags::camera_flags;
 use super::input::Input;
 use super::keymap::Tap;
-use crate::image::{Display, ToneMap};
-use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform};
-use crate::trace::{Integrator, RenderSettings};
+use crate::image::develop::exposure_for;
+use crate::image::{Display, ToneMap, save};
+use crate::open::SceneOrigin;
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
+use crate::trace::{Film, Integrator, RenderSettings};
 use bevy_ecs::prelude::*;
+use std::path::PathBuf;
 
 /// Whether refinement rests. The view still follows the camera.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,8 +38,8 @@ pub fn change_settings(
     if let Some(size) = input.resize {
         wanted.size = size;
     }
-    for (tap, _) in &input.taps {
-        let said = match tap {
+    for press in &input.taps {
+        let said = match press.tap {
             Tap::Filter => {
                 wanted.filter = match wanted.filter {
                     None => Some(Filter::Nearest),
@@ -63,18 +66,25 @@ pub fn change_settings(
 }
 
 /// Exposure and tone map, which leave the film alone.
-pub fn change_display(input: Res<Input>, mut display: ResMut<Display>) {
+pub fn change_display(
+    input: Res<Input>,
+    film: Res<Film>,
+    mut display: ResMut<Display>,
+    mut notices: ResMut<Notices>,
+) {
     let mut wanted = *display;
-    for &(tap, shift) in &input.taps {
-        let thirds = if shift { 3.0 } else { 1.0 };
-        match tap {
+    for press in &input.taps {
+        let thirds = if press.shift { 3.0 } else { 1.0 };
+        match press.tap {
+            Tap::AutoExposure => match exposure_for(&film) {
+                Some(stops) => wanted.exposure = stops,
+                None => notices.0.push(Notice::Text("nothing bright to expose for".to_owned())),
+            },
             Tap::Brighter => wanted.exposure = step_exposure(wanted.exposure, thirds),
             Tap::Darker => wanted.exposure = step_exposure(wanted.exposure, -thirds),
             Tap::ToneMap => {
-                wanted.tone_map = match wanted.tone_map {
-                    ToneMap::Clip => ToneMap::Neutral,
-                    ToneMap::Neutral => ToneMap::Clip,
-                };
+                wanted.tone_map = wanted.tone_map.stepped(press.shift);
+                notices.0.push(Notice::Text(format!("tone map: {}", tone_map_name(wanted.tone_map))));
             }
             _ => {}
         }
@@ -87,6 +97,29 @@ fn step_exposure(exposure: f32, thirds: f32) -> f32 {
     ((exposure * 3.0).round() + thirds).clamp(-90.0, 90.0) / 3.0
 }
 
+/// Saves the film, linear and as it is shown.
+pub fn save_picture(
+    input: Res<Input>,
+    film: Res<Film>,
+    display: Res<Display>,
+    origin: Option<Res<SceneOrigin>>,
+    mut notices: ResMut<Notices>,
+) {
+    if input.count(Tap::SavePicture) == 0 {
+        return;
+    }
+    let stem = origin.map_or_else(|| "scene".to_owned(), |origin| origin.source.name());
+    let name = |n: u32, ending: &str| PathBuf::from(format!("{stem}_{n}.{ending}"));
+    let free = |n: &u32| !name(*n, "exr").exists() && !name(*n, "png").exists();
+    let n = (1..u32::MAX).find(free).unwrap_or(u32::MAX);
+    let saved = ["exr", "png"].map(|ending| save(&name(n, ending), &film, &display));
+    let said = match saved.into_iter().find_map(Result::err) {
+        None => format!("saved {stem}_{n}.exr and .png"),
+        Some(error) => format!("not saved: {error}"),
+    };
+    notices.0.push(Notice::Text(said));
+}
+
 /// Pause and resume.
 pub fn change_pause(input: Res<Input>, mut paused: ResMut<Paused>) {
     let flipped = paused.0 ^ (input.count(Tap::Pause) % 2 == 1);
@@ -97,13 +130,13 @@ pub fn change_pause(input: Res<Input>, mut paused: ResMut<Paused>) {
 pub fn print_camera(
     input: Res<Input>,
     active: Res<ActiveCamera>,
-    cameras: Query<(&Camera, &GlobalTransform)>,
+    cameras: Query<(&Camera, &GlobalTransform, Option<&Lens>)>,
     mut notices: ResMut<Notices>,
 ) {
     if input.count(Tap::PrintCamera) > 0
-        && let Ok((camera, pose)) = cameras.get(active.0)
+        && let Ok((camera, pose, lens)) = cameras.get(active.0)
     {
-        notices.0.push(Notice::Print(camera_flags(*camera, *pose)));
+        notices.0.push(Notice::Print(camera_flags(*camera, *pose, lens.copied())));
     }
 }
 
@@ -131,25 +164,30 @@ pub fn integrator_name(integrator: Integrator) -> &'static str {
 pub fn tone_map_name(tone_map: ToneMap) -> &'static str {
     match tone_map {
         ToneMap::Clip => "clip",
-        ToneMap::Neutral => "neutral",
+        ToneMap::Neutral => "Khronos neutral",
+        ToneMap::AgX => "AgX",
+        ToneMap::Aces => "ACES",
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::input::Press;
     use super::*;
     use glam::UVec2;
     use std::time::Instant;
 
     fn run(taps: &[(Tap, bool)], resize: Option<UVec2>) -> World {
+        let press = |&(tap, shift): &(Tap, bool)| Press { shift, ..Press::from(tap) };
         let mut world = World::new();
         world.init_resource::<RenderSettings>();
         world.init_resource::<Display>();
         world.init_resource::<Notices>();
         world.init_resource::<Paused>();
+        world.insert_resource(Film::new(UVec2::ONE, 0));
         world.clear_trackers();
         let mut input = Input::new(Instant::now());
-        input.taps = taps.to_vec();
+        input.taps = taps.iter().map(press).collect();
         input.resize = resize;
         world.insert_resource(input);
         let mut schedule = Schedule::default();

@@ -1,19 +1,27 @@
 //! The thread that owns the [`App`] and runs its frames, so that the window never waits for a ray.
 
-use super::controls::{Notice, Notices, Paused, change_display, change_pause, change_settings, print_camera};
-use super::fly::{FileCameras, FlySpeed, change_speed, choose_camera, fly_camera, look_around, take_off};
-use super::hud::Status;
+use super::controls::{Notice, Notices, Paused};
+use super::debug::CurrentLayer;
+use super::debug::layer::Layer;
 use super::input::{Command, Input};
-use crate::app::{App, FrameBudget, FrameStats, FrameSystems};
+use super::instrument::{Instrument, Reference};
+use super::keymap::Tap;
+use super::prepare::{prepare, status};
+use super::reload::{load_again, open_other};
+use super::status::Status;
+use super::watch::{PAUSE, SceneWatch};
+use crate::app::{App, FrameBudget, FrameStats};
+use crate::image::compare::LinearImage;
+use crate::image::develop::develop_image;
 use crate::image::{Display, Picture};
-use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
+use crate::load::SceneSource;
+use crate::open::SceneOrigin;
 use crate::sync::Redone;
-use crate::trace::{Geometry, RenderSettings};
 use bevy_ecs::prelude::*;
-use bevy_ecs::system::RunSystemOnce;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -24,11 +32,12 @@ const RESTING: std::ops::RangeInclusive<Duration> = Duration::from_millis(30)..=
 /// The longer the view rests, the rarer the pictures: this share of the time since it changed.
 const RESTING_SHARE: f64 = 0.1;
 
-/// Speed at the start, in radii of the scene per second.
-const RADII_PER_SECOND: f64 = 0.5;
+/// Whether there is something left to do although all samples are there. Set by systems, lowered before each frame.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pending(pub bool);
 
 /// What the engine tells the window's thread to look at.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum Wake {
     /// [`Published`] has news.
     FrameReady,
@@ -38,6 +47,12 @@ pub enum Wake {
     Crashed(String),
     /// Something to show to the user.
     Notice(String),
+    /// Something to show, and to be pasted elsewhere.
+    Copy(String),
+    /// Another scene is shown now, of this name.
+    Opened(String),
+    /// The reference, developed, to compare with.
+    Reference(Picture),
 }
 
 /// The latest that the engine made; what the window has not taken is overwritten.
@@ -47,6 +62,8 @@ pub struct Published {
     pub picture: Option<Picture>,
     /// A picture that is no longer needed, for its memory.
     pub spare: Picture,
+    /// What is drawn over the picture.
+    pub layer: Option<Arc<Layer>>,
     /// For the status lines. `None` until the scene is open.
     pub status: Option<Status>,
     /// Whether the view is changing, so that pictures are to be shown at once.
@@ -57,8 +74,12 @@ pub struct Published {
 
 /// The engine's ends of what connects it with the window.
 pub struct Engine<W> {
+    /// A picture to measure the true error by.
+    pub reference: Option<LinearImage>,
     /// From the window.
     pub commands: Receiver<Command>,
+    /// To the engine itself, from whoever watches files for it.
+    pub own: Sender<Command>,
     /// Raised by the window after a command.
     pub interrupt: Arc<AtomicBool>,
     /// To the window.
@@ -74,10 +95,18 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl<W: Fn(Wake)> Engine<W> {
     /// Opens the app and runs frames until told to quit.
-    pub fn run(self, open: impl FnOnce() -> Result<App, String>) {
+    pub fn run(mut self, open: impl FnOnce() -> Result<App, String>) {
         // A bug in a frame must end in a message, not in a window that never changes again.
         let outcome = catch_unwind(AssertUnwindSafe(|| match open() {
-            Ok(mut app) => self.run_frames(&mut app),
+            Ok(mut app) => {
+                let reference = self.reference.take();
+                if let Some(image) = &reference {
+                    let rgba = develop_image(image, app.world.resource::<Display>());
+                    (self.wake)(Wake::Reference(Picture { size: image.size, rgba, version: 0 }));
+                }
+                app.world.insert_resource(Instrument::against(reference.map(Reference::new)));
+                self.run_frames(app);
+            }
             Err(why) => (self.wake)(Wake::OpenFailed(why)),
         }));
         if let Err(panic) = outcome {
@@ -85,27 +114,46 @@ impl<W: Fn(Wake)> Engine<W> {
         }
     }
 
-    fn run_frames(&self, app: &mut App) {
-        prepare(app, &self.interrupt);
+    fn run_frames(&self, mut app: App) {
+        prepare(&mut app, &self.interrupt);
+        let mut files = self.watch(&app);
         let mut view_changed_at = Instant::now();
         let mut idle = false;
         loop {
             let mut asked = None;
+            let mut commands = Vec::new();
             if idle {
-                // No CPU at all until the user does something.
-                match self.commands.recv() {
-                    Ok(Command::Quit) | Err(_) => return,
-                    Ok(command) => note(app, &command, &mut asked),
+                // No CPU at all until the user does something, or files do.
+                match files.wait(&self.commands) {
+                    Ok(command) => commands.push(command),
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return,
                 }
             }
             // Lowered before the commands are read: one that comes later raises it again.
             self.interrupt.store(false, Ordering::SeqCst);
-            for command in self.commands.try_iter() {
-                if matches!(command, Command::Quit) {
-                    return;
+            commands.extend(self.commands.try_iter());
+            let mut wanted = None;
+            for command in commands {
+                match command {
+                    Command::Quit => return,
+                    Command::Open(path) => wanted = Some(Some(path)),
+                    Command::FilesChanged => files.look(),
+                    Command::Tap { press, .. } if press.tap == Tap::Reload => wanted = Some(None),
+                    command => note(&mut app, &command, &mut asked),
                 }
-                note(app, &command, &mut asked);
             }
+            if files.is_time() {
+                wanted = wanted.or(Some(None));
+            }
+            if let Some(path) = wanted
+                && let Some(other) = self.replaced(&mut app, path)
+            {
+                app = other;
+                prepare(&mut app, &self.interrupt);
+                files = self.watch(&app);
+            }
+            let app = &mut app;
             let now = Instant::now();
             let mut input = app.world.resource_mut::<Input>();
             input.hold_until(now);
@@ -121,6 +169,7 @@ impl<W: Fn(Wake)> Engine<W> {
 
             let resets = app.world.resource::<Redone>().resets;
             let version = app.world.resource::<Picture>().version;
+            app.world.resource_mut::<Pending>().0 = false;
             app.frame();
             app.world.resource_mut::<Input>().end_frame();
 
@@ -130,10 +179,53 @@ impl<W: Fn(Wake)> Engine<W> {
                 view_changed_at = Instant::now();
             }
             let held = app.world.resource::<Input>().is_moving();
-            idle = !held && (stats.done || app.world.resource::<Paused>().0);
+            idle = !held
+                && (stats.done || app.world.resource::<Paused>().0)
+                && !app.world.resource::<Pending>().0;
             self.say(app);
             self.publish(app, version, moving, asked);
         }
+    }
+
+    /// The scene loaded again, or that of `path` in its place; `None`, and a notice, if that cannot be.
+    fn replaced(&self, app: &mut App, path: Option<PathBuf>) -> Option<App> {
+        let start = Instant::now();
+        let again = path.is_none();
+        let loaded = match path {
+            Some(path) => open_other(app, &path),
+            None => load_again(app),
+        };
+        match loaded {
+            Ok(other) => {
+                let name =
+                    other.world.get_resource::<SceneOrigin>().map_or_else(String::new, |o| o.source.name());
+                let (verb, seconds) =
+                    (if again { "reloaded" } else { "opened" }, start.elapsed().as_secs_f64());
+                (self.wake)(Wake::Notice(format!("{verb} {name} in {seconds:.2} s")));
+                (self.wake)(Wake::Opened(name));
+                Some(other)
+            }
+            Err(why) => {
+                (self.wake)(Wake::Notice(format!("still the old scene: {why}")));
+                None
+            }
+        }
+    }
+
+    fn watch(&self, app: &App) -> Files {
+        let origin = app.world.get_resource::<SceneOrigin>();
+        let watch = origin.and_then(|origin| match &origin.source {
+            SceneSource::BuiltIn(_) => None,
+            SceneSource::File(path) => {
+                let (own, interrupt) = (self.own.clone(), Arc::clone(&self.interrupt));
+                Some(SceneWatch::new(path, move || {
+                    // An engine that has ended does not care.
+                    let _ = own.send(Command::FilesChanged);
+                    interrupt.store(true, Ordering::SeqCst);
+                }))
+            }
+        });
+        Files { watch, due: None }
     }
 
     /// Hands over what is new.
@@ -152,7 +244,14 @@ impl<W: Fn(Wake)> Engine<W> {
             published.picture = Some(copy);
             published.asked = published.asked.or(asked);
         }
-        let news = has_picture || published.status.as_ref() != Some(&status);
+        let layer = app.world.resource::<CurrentLayer>().0.clone();
+        let same_layer = match (&layer, &published.layer) {
+            (Some(new), Some(old)) => Arc::ptr_eq(new, old),
+            (None, None) => true,
+            _ => false,
+        };
+        published.layer = layer;
+        let news = has_picture || !same_layer || published.status.as_ref() != Some(&status);
         published.status = Some(status);
         published.moving = moving;
         drop(published);
@@ -164,83 +263,50 @@ impl<W: Fn(Wake)> Engine<W> {
     /// Passes the frame's notices on.
     fn say(&self, app: &mut App) {
         for notice in std::mem::take(&mut app.world.resource_mut::<Notices>().0) {
-            let text = match notice {
-                Notice::Text(text) => text,
+            (self.wake)(match notice {
+                Notice::Text(text) => Wake::Notice(text),
                 Notice::Print(text) => {
                     use std::io::Write;
                     // Whoever closed standard output does not want to read it.
                     let _ = writeln!(std::io::stdout(), "{text}");
-                    text
+                    Wake::Copy(text)
                 }
-            };
-            (self.wake)(Wake::Notice(text));
+            });
         }
     }
 }
 
-/// Adds the window's resources and systems.
-fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
-    let mut budget = app.world.resource_mut::<FrameBudget>();
-    budget.interrupt = Arc::clone(interrupt);
-    budget.preview = true;
-    // The camera may be asked for its place before the first frame has run.
-    let propagated = app.world.run_system_once(propagate_transforms);
-    debug_assert!(propagated.is_ok());
-    let camera = app.world.resource::<ActiveCamera>().0;
-    app.world.insert_resource(FileCameras { home: camera, last: camera });
-    app.world.insert_resource(Input::new(Instant::now()));
-    app.world.init_resource::<Paused>();
-    app.world.init_resource::<Notices>();
-    if !app.world.contains_resource::<FlySpeed>() {
-        let radius = app.world.get_resource::<SceneBounds>().map_or(2.0, |bounds| bounds.radius);
-        app.world.insert_resource(FlySpeed(RADII_PER_SECOND * radius));
+/// The files of the scene, and when it is to be loaded again for them.
+struct Files {
+    watch: Option<SceneWatch>,
+    due: Option<Instant>,
+}
+
+impl Files {
+    /// Something happened in their folders.
+    fn look(&mut self) {
+        if self.watch.as_mut().is_some_and(SceneWatch::has_changed) {
+            self.due = Some(Instant::now() + PAUSE);
+        }
     }
-    app.add_systems(
-        (
-            change_settings,
-            change_display,
-            change_pause,
-            change_speed,
-            choose_camera,
-            take_off,
-            look_around,
-            fly_camera,
-            print_camera,
-        )
-            .chain()
-            .in_set(FrameSystems::Input),
-    );
+
+    fn is_time(&mut self) -> bool {
+        self.due.take_if(|due| *due <= Instant::now()).is_some()
+    }
+
+    /// The next command, or until it is time.
+    fn wait(&self, commands: &Receiver<Command>) -> Result<Command, RecvTimeoutError> {
+        match self.due {
+            Some(due) => commands.recv_timeout(due.saturating_duration_since(Instant::now())),
+            None => commands.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        }
+    }
 }
 
 /// Applies `command`; the first question for another view is remembered in `asked`.
 fn note(app: &mut App, command: &Command, asked: &mut Option<Instant>) {
     let at = app.world.resource_mut::<Input>().apply(command);
     *asked = asked.or(at);
-}
-
-fn status(app: &App) -> Status {
-    let world = &app.world;
-    let stats = world.resource::<FrameStats>();
-    let settings = world.resource::<RenderSettings>();
-    let display = world.resource::<Display>();
-    Status {
-        samples_per_pixel: stats.samples_per_pixel,
-        sample_target: world.resource::<FrameBudget>().sample_target,
-        done: stats.done,
-        paused: world.resource::<Paused>().0,
-        noise: stats.noise,
-        rays_per_second: stats.rays_per_second,
-        preview_scale: stats.preview_scale,
-        resets: world.resource::<Redone>().resets,
-        dropped: stats.dropped,
-        exposure: display.exposure,
-        tone_map: display.tone_map,
-        speed: world.resource::<FlySpeed>().0,
-        size: settings.size,
-        integrator: settings.integrator,
-        filter: settings.filter,
-        isa: world.resource::<Geometry>().tlas.isa().name(),
-    }
 }
 
 /// The text of a caught panic.

@@ -1,11 +1,12 @@
-//! The camera that flies, and the choice among the file's cameras.
+//! The camera that flies.
 //!
 //! Cameras of the file are never touched: the first motion spawns a free camera where the active one
 //! is. So a camera may hang anywhere in a hierarchy, and Enter finds it as the file has it.
 
-use super::input::Input;
+use super::input::{Drag, Input};
 use super::keymap::{Hold, Tap};
-use crate::scene::{ActiveCamera, Camera, GlobalTransform, Projection, Transform};
+use super::orbit::{Navigation, pivot_depth};
+use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Projection, Transform};
 use bevy_ecs::prelude::*;
 use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot};
 use std::f64::consts::FRAC_PI_2;
@@ -43,15 +44,6 @@ pub struct FlyCameraState {
 #[derive(Resource, Clone, Copy, Debug, PartialEq)]
 pub struct FlySpeed(pub f64);
 
-/// Which cameras of the file were looked through.
-#[derive(Resource, Clone, Copy, Debug, PartialEq)]
-pub struct FileCameras {
-    /// The one that the window opened with.
-    pub home: Entity,
-    /// The last one.
-    pub last: Entity,
-}
-
 impl FlyCameraState {
     /// The yaw and pitch of an orientation; its roll is left out.
     #[must_use]
@@ -81,41 +73,19 @@ impl FlyCameraState {
     }
 }
 
-/// Shows the file's next or previous camera, or the first one again.
-pub fn choose_camera(
-    input: Res<Input>,
-    cameras: Query<Entity, (With<Camera>, With<Name>, Without<FlyCamera>)>,
-    mut seen: ResMut<FileCameras>,
-    mut active: ResMut<ActiveCamera>,
-) {
-    let mut camera = input.count(Tap::ResetCamera).gt(&0).then_some(seen.home);
-    let steps = input.count(Tap::NextCamera) as i64 - input.count(Tap::PreviousCamera) as i64;
-    if steps != 0 {
-        let mut cameras: Vec<Entity> = cameras.iter().collect();
-        cameras.sort_by_key(|camera| camera.index_u32());
-        let here =
-            cameras.iter().position(|&c| c == seen.last).map_or(if steps > 0 { -1 } else { 0 }, |i| i as i64);
-        let there = (here + steps).checked_rem_euclid(cameras.len() as i64);
-        camera = there.and_then(|there| cameras.get(there as usize).copied()).or(camera);
-    }
-    if let Some(camera) = camera {
-        seen.last = camera;
-        active.set_if_neq(ActiveCamera(camera));
-    }
-}
-
 /// Before the first motion: puts the free camera where the active one is, and looks through it.
 pub fn take_off(
     input: Res<Input>,
     mut active: ResMut<ActiveCamera>,
-    cameras: Query<(&Camera, &GlobalTransform)>,
+    cameras: Query<(&Camera, &GlobalTransform, Option<&Lens>)>,
     free: Query<Entity, With<FlyCamera>>,
     mut commands: Commands,
 ) {
-    if !input.has_motion() || free.contains(active.0) {
+    let moves = input.has_motion() || input.taps.iter().any(|press| press.tap.changes_free_camera());
+    if !moves || free.contains(active.0) {
         return;
     }
-    let Ok((camera, pose)) = cameras.get(active.0) else {
+    let Ok((camera, pose, lens)) = cameras.get(active.0) else {
         return;
     };
     let state = FlyCameraState::of(pose.0.matrix3);
@@ -124,15 +94,24 @@ pub fn take_off(
         Some(entity) => commands.entity(entity).insert(bundle).id(),
         None => commands.spawn((FlyCamera::default(), bundle)).id(),
     };
+    match lens {
+        Some(&lens) => commands.entity(entity).insert(lens),
+        None => commands.entity(entity).remove::<Lens>(),
+    };
     active.0 = entity;
 }
 
 /// Turns the free camera.
-pub fn look_around(input: Res<Input>, mut cameras: Query<(&FlyCamera, &mut FlyCameraState, &mut Transform)>) {
+pub fn look_around(
+    input: Res<Input>,
+    navigation: Res<Navigation>,
+    mut cameras: Query<(&FlyCamera, &mut FlyCameraState, &mut Transform)>,
+) {
     let keys =
         DVec2::new(input.axis(Hold::LookRight, Hold::LookLeft), input.axis(Hold::LookDown, Hold::LookUp));
+    let keys = if navigation.orbiting { DVec2::ZERO } else { keys };
     for (settings, mut state, mut transform) in &mut cameras {
-        let angles = keys * settings.turn_speed + input.look * settings.mouse_turn;
+        let angles = keys * settings.turn_speed + input.dragged(Drag::Look) * settings.mouse_turn;
         // The roll of a file's camera is kept until the user looks around.
         if angles != DVec2::ZERO && state.set_if_neq(state.turned(angles)) {
             let mut turned = *transform;
@@ -142,19 +121,45 @@ pub fn look_around(input: Res<Input>, mut cameras: Query<(&FlyCamera, &mut FlyCa
     }
 }
 
+impl FlyCamera {
+    /// Factor of the speed by Shift and Alt.
+    #[must_use]
+    pub fn boost(&self, input: &Input) -> f64 {
+        let fast = if input.is_held(Hold::Fast) { self.fast } else { 1.0 };
+        let slow = if input.is_held(Hold::Slow) { self.slow } else { 1.0 };
+        fast * slow
+    }
+}
+
 /// Moves the free camera: along its line of sight and to its sides, up and down along the world's axis.
-pub fn fly_camera(input: Res<Input>, speed: Res<FlySpeed>, mut cameras: Query<(&FlyCamera, &mut Transform)>) {
+///
+/// A parallel projection looks the same from wherever along the line of sight: it gets narrower instead.
+pub fn fly_camera(
+    input: Res<Input>,
+    speed: Res<FlySpeed>,
+    navigation: Res<Navigation>,
+    mut cameras: Query<(&FlyCamera, &mut Transform, &mut Camera)>,
+) {
+    if navigation.orbiting {
+        return;
+    }
     let right = input.axis(Hold::Right, Hold::Left);
     let up = input.axis(Hold::Up, Hold::Down);
     let back = input.axis(Hold::Back, Hold::Forward);
-    for (settings, mut transform) in &mut cameras {
+    for (settings, mut transform, mut camera) in &mut cameras {
         let axes = transform.0.matrix3;
-        let seconds =
-            axes.x_axis.normalize_or_zero() * right + DVec3::Y * up + axes.z_axis.normalize_or_zero() * back;
-        let fast = if input.is_held(Hold::Fast) { settings.fast } else { 1.0 };
-        let slow = if input.is_held(Hold::Slow) { settings.slow } else { 1.0 };
+        let mut seconds = axes.x_axis.normalize_or_zero() * right + DVec3::Y * up;
+        let speed = speed.0 * settings.boost(&input);
+        match camera.projection {
+            Projection::Perspective { .. } => seconds += axes.z_axis.normalize_or_zero() * back,
+            Projection::Orthographic { height } if back != 0.0 => {
+                let wider = (back * speed / pivot_depth(&transform, navigation.pivot)).exp();
+                camera.projection = Projection::Orthographic { height: height * wider as f32 };
+            }
+            Projection::Orthographic { .. } => {}
+        }
         let mut moved = *transform;
-        moved.0.translation += seconds * speed.0 * fast * slow;
+        moved.0.translation += seconds * speed;
         transform.set_if_neq(moved);
     }
 }
@@ -166,41 +171,18 @@ pub fn change_speed(input: Res<Input>, mut speed: ResMut<FlySpeed>) {
     speed.set_if_neq(FlySpeed((speed.0 * factor).clamp(1e-12, 1e12)));
 }
 
-/// The command line flags that look through `camera` at `pose`.
-#[must_use]
-pub fn camera_flags(camera: Camera, pose: GlobalTransform) -> String {
-    let eye = pose.0.translation;
-    let axes = pose.0.matrix3;
-    let flags = format!(
-        "--camera-position {} --camera-focal-point {} --camera-view-up {}",
-        list(eye),
-        list(eye - axes.z_axis.normalize_or(DVec3::Z)),
-        list(axes.y_axis.normalize_or(DVec3::Y)),
-    );
-    match camera.projection {
-        Projection::Perspective { vertical_fov } => {
-            let degrees = vertical_fov.to_degrees();
-            if degrees.to_radians() == vertical_fov {
-                format!("{flags} --camera-view-angle {degrees}")
-            } else {
-                format!("{flags} --camera-view-angle {}", f64::from(vertical_fov).to_degrees())
-            }
-        }
-        Projection::Orthographic { .. } => flags,
-    }
-}
-
-/// Exact: the shortest text that gives the same numbers again.
-fn list(v: DVec3) -> String {
-    // Adding 0 turns −0 into 0.
-    let v = v + DVec3::ZERO;
-    format!("{},{},{}", v.x, v.y, v.z)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::input::Command;
+    use super::super::cameras::{
+        Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
+    };
+    use super::super::controls::Notices;
+    use super::super::input::{Command, Press};
+    use super::super::keymap::Side;
+    use super::super::orbit::orbit_camera;
     use super::*;
+    use crate::scene::SceneBounds;
+    use crate::trace::RenderSettings;
     use std::time::{Duration, Instant};
 
     fn world() -> (World, Schedule) {
@@ -210,15 +192,26 @@ mod tests {
         world.insert_resource(ActiveCamera(camera));
         world.insert_resource(FileCameras { home: camera, last: camera });
         world.insert_resource(FlySpeed(2.0));
+        world.insert_resource(Navigation { orbiting: false, pivot: DVec3::ZERO, vertical_fov: 1.0 });
+        world.insert_resource(SceneBounds { center: DVec3::ONE, radius: 2.0 });
+        world.init_resource::<Bookmarks>();
+        world.init_resource::<Notices>();
+        world.init_resource::<RenderSettings>();
         let mut schedule = Schedule::default();
         schedule.add_systems(
             (
                 choose_camera,
                 take_off,
+                recall,
+                choose_side,
+                change_projection,
+                change_lens,
                 look_around,
                 change_speed,
                 fly_camera,
+                orbit_camera,
                 crate::scene::propagate_transforms,
+                remember,
             )
                 .chain(),
         );
@@ -304,13 +297,13 @@ mod tests {
         let home = world.resource::<ActiveCamera>().0;
         let pose = *world.get::<Transform>(home).unwrap();
         let mut input = Input::new(Instant::now());
-        input.look = DVec2::new(10.0, 0.0);
+        input.dragged[Drag::Look as usize] = DVec2::new(10.0, 0.0);
         world.insert_resource(input);
         schedule.run(&mut world);
         assert_ne!(world.resource::<ActiveCamera>().0, home);
         assert_eq!(*world.get::<Transform>(home).unwrap(), pose);
         world.resource_mut::<Input>().end_frame();
-        world.resource_mut::<Input>().taps.push((Tap::ResetCamera, false));
+        world.resource_mut::<Input>().taps.push(Tap::ResetCamera.into());
         schedule.run(&mut world);
         assert_eq!(world.resource::<ActiveCamera>().0, home);
     }
@@ -321,9 +314,9 @@ mod tests {
         let first = world.resource::<ActiveCamera>().0;
         let second = world.spawn((Camera::default(), Name::new("b"))).id();
         let third = world.spawn((Camera::default(), Name::new("c"))).id();
-        let mut step = |tap| {
+        let mut step = |tap: Tap| {
             let mut input = Input::new(Instant::now());
-            input.taps.push((tap, false));
+            input.taps.push(tap.into());
             world.insert_resource(input);
             schedule.run(&mut world);
             world.resource::<ActiveCamera>().0
@@ -342,12 +335,85 @@ mod tests {
         }
     }
 
+    /// The active camera after these presses, one frame each.
+    fn press(world: &mut World, schedule: &mut Schedule, taps: &[Tap]) -> (Camera, GlobalTransform) {
+        for &tap in taps {
+            world.resource_mut::<Input>().taps.push(Press::from(tap));
+            schedule.run(world);
+            world.resource_mut::<Input>().end_frame();
+        }
+        let active = world.resource::<ActiveCamera>().0;
+        (*world.get(active).unwrap(), *world.get(active).unwrap())
+    }
+
+    fn at_rest() -> (World, Schedule) {
+        let (mut world, schedule) = world();
+        world.insert_resource(Input::new(Instant::now()));
+        (world, schedule)
+    }
+
     #[test]
-    fn flags_are_exact_and_short_where_the_numbers_are() {
-        let pose = Transform::looking_at(DVec3::new(0.1, -2.0, 3.0), DVec3::new(0.1, -2.0, 0.0), DVec3::Y);
-        assert_eq!(
-            camera_flags(Camera::default(), GlobalTransform(pose.0)),
-            "--camera-position 0.1,-2,3 --camera-focal-point 0.1,-2,2 --camera-view-up 0,1,0 --camera-view-angle 45"
-        );
+    fn sides_look_at_the_pivot_from_as_far_as_before() {
+        let (mut world, mut schedule) = at_rest();
+        let distance = DVec3::new(1.0, 2.0, 3.0).length();
+        for (side, from) in [
+            (Side::Front, DVec3::Z),
+            (Side::Back, DVec3::NEG_Z),
+            (Side::Right, DVec3::X),
+            (Side::Left, DVec3::NEG_X),
+            (Side::Top, DVec3::Y),
+            (Side::Bottom, DVec3::NEG_Y),
+        ] {
+            let (_, pose) = press(&mut world, &mut schedule, &[Tap::View(side)]);
+            assert!(pose.0.translation.abs_diff_eq(from * distance, 1e-9), "{side:?} {pose:?}");
+            assert!(pose.0.matrix3.z_axis.abs_diff_eq(from, 1e-9), "{side:?} {pose:?}");
+        }
+    }
+
+    #[test]
+    fn the_whole_scene_fits_and_parallel_rays_show_the_pivot_as_large() {
+        let (mut world, mut schedule) = at_rest();
+        let (camera, pose) = press(&mut world, &mut schedule, &[Tap::FrameAll]);
+        let Projection::Perspective { vertical_fov } = camera.projection else { panic!() };
+        let distance = (pose.0.translation - DVec3::ONE).length();
+        assert!((distance * (0.5 * f64::from(vertical_fov)).sin() - 2.0).abs() < 1e-6);
+        let (camera, _) = press(&mut world, &mut schedule, &[Tap::Orthographic]);
+        let Projection::Orthographic { height } = camera.projection else { panic!() };
+        let wanted = 2.0 * distance * (0.5 * f64::from(vertical_fov)).tan();
+        assert!((f64::from(height) / wanted - 1.0).abs() < 1e-6);
+        let (camera, again) = press(&mut world, &mut schedule, &[Tap::Orthographic]);
+        assert_eq!(camera.projection, Projection::Perspective { vertical_fov });
+        assert!(pose.0.abs_diff_eq(again.0, 1e-5), "{pose:?} {again:?}");
+    }
+
+    #[test]
+    fn bookmarks_bring_camera_lens_and_pivot_back() {
+        let (mut world, mut schedule) = at_rest();
+        let before = press(&mut world, &mut schedule, &[Tap::FrameAll, Tap::OpenLens, Tap::Remember(3)]);
+        let lens = |world: &World| world.get::<Lens>(world.resource::<ActiveCamera>().0).copied();
+        let sharp = lens(&world).expect("an open lens");
+        let pivot = world.resource::<Navigation>().pivot;
+        let away = [Tap::CloseLens, Tap::View(Side::Top), Tap::Orthographic];
+        assert_ne!(press(&mut world, &mut schedule, &away), before);
+        assert_eq!(lens(&world), None);
+        world.resource_mut::<Navigation>().pivot = DVec3::ZERO;
+        let after = press(&mut world, &mut schedule, &[Tap::Recall(3)]);
+        assert_eq!((after, lens(&world)), (before, Some(sharp)));
+        assert_eq!(world.resource::<Navigation>().pivot, pivot);
+    }
+
+    #[test]
+    fn orbiting_keeps_the_distance_and_a_whole_turn_drifts_nowhere() {
+        let (mut world, mut schedule) = at_rest();
+        let start = press(&mut world, &mut schedule, &[Tap::View(Side::Front)]).1;
+        let pixels = std::f64::consts::TAU / (2.0 * FlyCamera::default().mouse_turn) / 1000.0;
+        for _ in 0..1000 {
+            world.resource_mut::<Input>().dragged[Drag::Orbit as usize] = DVec2::new(pixels, 0.0);
+            let pose = press(&mut world, &mut schedule, &[Tap::Navigation]).1;
+            let distance = pose.0.translation.length();
+            assert!((distance - start.0.translation.length()).abs() < 1e-9, "{distance}");
+        }
+        let end = press(&mut world, &mut schedule, &[]).1;
+        assert!(end.0.abs_diff_eq(start.0, 1e-9), "{start:?} {end:?}");
     }
 }

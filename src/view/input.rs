@@ -1,8 +1,10 @@
 //! What the user does, from the window's thread to the frame's systems.
 
+use super::edit::property::Property;
 use super::keymap::{Hold, Tap};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, UVec2};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// From the window to the engine.
@@ -15,28 +17,118 @@ pub enum Command {
         /// When the event arrived.
         at: Instant,
     },
-    /// The mouse looked around.
-    Look {
+    /// The mouse was dragged.
+    Drag {
+        /// What it is meant to do.
+        drag: Drag,
         /// To the right and down, in mouse pixels.
         pixels: DVec2,
         /// When the event arrived.
         at: Instant,
     },
-    /// The wheel turned: notches, away from the user is positive.
-    Wheel(f64),
-    /// A key was pressed (or repeated).
-    Tap {
-        /// Its meaning.
-        tap: Tap,
-        /// Whether Shift was down.
-        shift: bool,
+    /// The wheel turned.
+    Wheel {
+        /// Away from the user is positive.
+        notches: f64,
+        /// Nearer to the pivot, not faster.
+        dolly: bool,
         /// When the event arrived.
         at: Instant,
     },
+    /// A key was pressed (or repeated).
+    Tap {
+        /// Which, and how.
+        press: Press,
+        /// When the event arrived.
+        at: Instant,
+    },
+    /// A number of the selected thing is to be another.
+    Edit {
+        /// Which.
+        property: Property,
+        /// How much.
+        value: f64,
+        /// When the event arrived.
+        at: Instant,
+    },
+    /// Show this scene instead.
+    Open(PathBuf),
+    /// A file of the scene may have changed.
+    FilesChanged,
     /// The window's inside has this many pixels, each side at least 1.
     Resize(UVec2),
     /// End the engine.
     Quit,
+}
+
+/// What a dragged mouse does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drag {
+    /// Turn the camera.
+    Look,
+    /// Turn about the pivot.
+    Orbit,
+    /// Move sideways, so that the pivot stays under the cursor.
+    Pan,
+}
+
+/// A key press.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Press {
+    /// Its meaning.
+    pub tap: Tap,
+    /// Whether Shift was down.
+    pub shift: bool,
+    /// Where the cursor was, from the upper left corner at 0 to the lower right one at 1.
+    pub cursor: DVec2,
+}
+
+impl From<Tap> for Press {
+    /// Without Shift, in the middle.
+    fn from(tap: Tap) -> Self {
+        Self { tap, shift: false, cursor: DVec2::splat(0.5) }
+    }
+}
+
+impl Tap {
+    /// Whether it changes what the camera sees.
+    #[must_use]
+    pub fn moves_camera(self) -> bool {
+        self.changes_free_camera()
+            || matches!(self, Self::ResetCamera | Self::PreviousCamera | Self::NextCamera)
+    }
+
+    /// Whether it is for the editor.
+    #[must_use]
+    pub fn edits(self) -> bool {
+        matches!(
+            self,
+            Self::Select
+                | Self::Escape
+                | Self::PreviousRow
+                | Self::NextRow
+                | Self::Less
+                | Self::More
+                | Self::Hide
+                | Self::Duplicate
+                | Self::Undo
+                | Self::SaveEdits
+        )
+    }
+
+    /// Whether it changes the camera that the user flies, so that there must be one.
+    #[must_use]
+    pub fn changes_free_camera(self) -> bool {
+        matches!(
+            self,
+            Self::FrameAll
+                | Self::View(_)
+                | Self::Orthographic
+                | Self::OpenLens
+                | Self::CloseLens
+                | Self::Recall(_)
+        )
+    }
 }
 
 /// Longest time that one frame may move the camera by, seconds: after a hitch one does not find
@@ -49,12 +141,16 @@ pub struct Input {
     held: [bool; Hold::COUNT],
     seconds: [f64; Hold::COUNT],
     since: Instant,
-    /// Mouse motion to the right and down, pixels.
-    pub look: DVec2,
-    /// Wheel notches.
+    /// Mouse motion to the right and down, pixels, by [`Drag`].
+    pub dragged: [DVec2; 3],
+    /// Wheel notches, for the speed.
     pub wheel: f64,
-    /// Key presses, with whether Shift was down.
-    pub taps: Vec<(Tap, bool)>,
+    /// Wheel notches, toward the pivot.
+    pub dolly: f64,
+    /// Key presses.
+    pub taps: Vec<Press>,
+    /// New values for the selected thing.
+    pub edits: Vec<(Property, f64)>,
     /// New size of the picture.
     pub resize: Option<UVec2>,
 }
@@ -67,9 +163,11 @@ impl Input {
             held: [false; Hold::COUNT],
             seconds: [0.0; Hold::COUNT],
             since: now,
-            look: DVec2::ZERO,
+            dragged: [DVec2::ZERO; 3],
             wheel: 0.0,
+            dolly: 0.0,
             taps: Vec::new(),
+            edits: Vec::new(),
             resize: None,
         }
     }
@@ -83,23 +181,27 @@ impl Input {
                 self.held = held;
                 (pressed && self.is_moving()).then_some(at)
             }
-            Command::Look { pixels, at } => {
-                self.look += pixels;
+            Command::Drag { drag, pixels, at } => {
+                self.dragged[drag as usize] += pixels;
                 Some(at)
             }
-            Command::Wheel(notches) => {
-                self.wheel += notches;
-                None
+            Command::Wheel { notches, dolly, at } => {
+                *(if dolly { &mut self.dolly } else { &mut self.wheel }) += notches;
+                dolly.then_some(at)
             }
-            Command::Tap { tap, shift, at } => {
-                self.taps.push((tap, shift));
-                matches!(tap, Tap::ResetCamera | Tap::PreviousCamera | Tap::NextCamera).then_some(at)
+            Command::Tap { press, at } => {
+                self.taps.push(press);
+                press.tap.moves_camera().then_some(at)
+            }
+            Command::Edit { property, value, at } => {
+                self.edits.push((property, value));
+                Some(at)
             }
             Command::Resize(size) => {
                 self.resize = Some(size);
                 None
             }
-            Command::Quit => None,
+            Command::Open(_) | Command::FilesChanged | Command::Quit => None,
         }
     }
 
@@ -118,9 +220,11 @@ impl Input {
     /// Forgets what has been done with; what is held stays held.
     pub fn end_frame(&mut self) {
         self.seconds = [0.0; Hold::COUNT];
-        self.look = DVec2::ZERO;
+        self.dragged = [DVec2::ZERO; 3];
         self.wheel = 0.0;
+        self.dolly = 0.0;
         self.taps.clear();
+        self.edits.clear();
         self.resize = None;
     }
 
@@ -133,7 +237,15 @@ impl Input {
     /// Whether the camera was moved or turned since the last frame.
     #[must_use]
     pub fn has_motion(&self) -> bool {
-        self.look != DVec2::ZERO || self.seconds[..Hold::Fast as usize].iter().any(|&s| s > 0.0)
+        self.dolly != 0.0
+            || self.dragged.iter().any(|&pixels| pixels != DVec2::ZERO)
+            || self.seconds[..Hold::Fast as usize].iter().any(|&s| s > 0.0)
+    }
+
+    /// Mouse motion to the right and down, pixels.
+    #[must_use]
+    pub fn dragged(&self, drag: Drag) -> DVec2 {
+        self.dragged[drag as usize]
     }
 
     /// Seconds of `plus` less seconds of `minus`.
@@ -157,7 +269,7 @@ impl Input {
     /// How often `tap` was pressed since the last frame.
     #[must_use]
     pub fn count(&self, tap: Tap) -> usize {
-        self.taps.iter().filter(|(t, _)| *t == tap).count()
+        self.taps.iter().filter(|press| press.tap == tap).count()
     }
 }
 

@@ -5,24 +5,43 @@
 //! pictures the other way over a shared slot. What a key does stands in [`keymap`], and what it does
 //! to the world in [`fly`] and [`controls`].
 
+pub mod cameras;
+pub mod chord;
 pub mod controls;
+pub mod debug;
+pub mod edit;
 pub mod engine;
+pub mod flags;
 pub mod fly;
-pub mod hud;
 pub mod input;
+pub mod instrument;
 pub mod keymap;
+mod keys;
+pub mod keys_file;
+pub mod orbit;
+pub mod pixel_view;
+mod pointer;
+mod prepare;
+mod present;
+pub mod recipe;
+pub mod reload;
+pub mod replay;
 pub mod screen;
 pub mod screenshot;
+pub mod status;
+pub mod ui;
+pub mod watch;
 pub mod window;
 
 use crate::app::App;
+use crate::image::compare::LinearImage;
 use engine::Wake;
 use glam::UVec2;
 use std::time::Duration;
 use winit::event_loop::{EventLoop, EventLoopBuilder};
 
 /// What the window is like.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ViewOptions {
     /// First words of the window's title.
     pub title: String,
@@ -30,8 +49,54 @@ pub struct ViewOptions {
     pub size: UVec2,
     /// Name of the scene: screenshots are called `{screenshot_stem}_{n}.png`.
     pub screenshot_stem: String,
+    /// A picture to measure the true error by, of the view that the window opens with.
+    pub reference: Option<LinearImage>,
+    /// Which keys do what.
+    pub keys: keymap::Keymap,
+    /// What to do, as if a user did it. Then the times from events to pictures are printed.
+    pub replay: Option<replay::Replay>,
+    /// Where to write down what the user does.
+    pub record: Option<replay::Recorder>,
     /// Closes the window by itself after this time.
     pub exit_after: Option<Duration>,
+}
+
+/// How fast the window answered.
+#[derive(Clone, Debug, Default)]
+pub struct Response {
+    /// From events to the first picture that shows their effect, sorted.
+    pub latencies: Vec<Duration>,
+    /// Pictures presented.
+    pub pictures: u64,
+    /// Those of them while the view changed, and the time that they took.
+    pub moving_pictures: u64,
+    /// See `moving_pictures`.
+    pub moving_time: Duration,
+}
+
+impl Response {
+    /// The latency that this part of all does not exceed, milliseconds; `None` if there was no event.
+    #[must_use]
+    pub fn percentile(&self, part: f64) -> Option<f64> {
+        let rank = (self.latencies.len() as f64 * part).ceil() as usize;
+        let latency = self.latencies.get(rank.max(1) - 1).or(self.latencies.last())?;
+        Some(latency.as_secs_f64() * 1e3)
+    }
+
+    /// One JSON object.
+    #[must_use]
+    pub fn json(&self) -> String {
+        let number = |x: Option<f64>| x.map_or("null".to_owned(), |x| format!("{x:.2}"));
+        let rate = self.moving_pictures as f64 / self.moving_time.as_secs_f64();
+        format!(
+            "{{\"events\": {}, \"median_ms\": {}, \"p99_ms\": {}, \"pictures\": {}, \"moving_pictures_per_second\": {}}}",
+            self.latencies.len(),
+            number(self.percentile(0.5)),
+            number(self.percentile(0.99)),
+            self.pictures,
+            number(Some(rate).filter(|rate| rate.is_finite())),
+        )
+    }
 }
 
 /// Why there is no window (any more).
@@ -62,12 +127,13 @@ pub enum ViewError {
 pub fn run(
     options: ViewOptions,
     open: impl FnOnce() -> Result<App, String> + Send + 'static,
-) -> Result<(), ViewError> {
+) -> Result<Response, ViewError> {
     let event_loop = event_loop().map_err(ViewError::NoDisplay)?;
     let mut viewer = window::Viewer::new(options, event_loop.create_proxy(), Box::new(open));
     let outcome = event_loop.run_app(&mut viewer);
-    viewer.finish()?;
-    outcome.map_err(|e| ViewError::Lost(e.to_string()))
+    let response = viewer.finish()?;
+    outcome.map_err(|e| ViewError::Lost(e.to_string()))?;
+    Ok(response)
 }
 
 fn event_loop() -> Result<EventLoop<Wake>, String> {

@@ -1,7 +1,7 @@
 //! Pictures of the window as files.
 
+use crate::image::recipe::{Recipe, write_png};
 use glam::UVec2;
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,13 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// What went wrong, with the path.
-pub fn save(rgba: &[u8], size: UVec2, directory: &Path, stem: &str) -> Result<PathBuf, String> {
+pub fn save(
+    rgba: &[u8],
+    size: UVec2,
+    directory: &Path,
+    stem: &str,
+    recipe: &Recipe,
+) -> Result<PathBuf, String> {
     // A stem is a name, not a way to another directory.
     let stem: String = stem.chars().map(|c| if std::path::is_separator(c) { '_' } else { c }).collect();
     for n in 1_u32.. {
@@ -19,7 +25,7 @@ pub fn save(rgba: &[u8], size: UVec2, directory: &Path, stem: &str) -> Result<Pa
         // `create_new` looks and creates in one: two programs cannot get the same number.
         match File::create_new(&path) {
             Ok(file) => {
-                return write_png(file, rgba, size)
+                return write(file, rgba, size, recipe)
                     .map(|()| path.clone())
                     .map_err(|e| format!("{}: {e}", path.display()));
             }
@@ -30,13 +36,10 @@ pub fn save(rgba: &[u8], size: UVec2, directory: &Path, stem: &str) -> Result<Pa
     Err(format!("{}: no number is left for {stem}", directory.display()))
 }
 
-fn write_png(file: File, rgba: &[u8], size: UVec2) -> Result<(), String> {
-    let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+fn write(file: File, rgba: &[u8], size: UVec2, recipe: &Recipe) -> Result<(), String> {
     let mut file = BufWriter::new(file);
-    PngEncoder::new(&mut file)
-        .write_image(&rgb, size.x, size.y, ExtendedColorType::Rgb8)
-        .map_err(|e| e.to_string())?;
-    file.flush().map_err(|e| e.to_string())
+    write_png(&mut file, rgba, size.to_array(), recipe).map_err(|error| error.to_string())?;
+    file.flush().map_err(|error| error.to_string())
 }
 
 /// `picture` of `from` pixels, scaled to fill `target` of `to` pixels: nearest, since one shall see
@@ -69,13 +72,13 @@ mod tests {
         std::fs::create_dir_all(&directory).unwrap();
         let rgba = [10, 20, 30, 255, 40, 50, 60, 255];
         let size = UVec2::new(2, 1);
-        let first = save(&rgba, size, &directory, "a/b").unwrap();
-        let second = save(&rgba, size, &directory, "a/b").unwrap();
+        let first = save(&rgba, size, &directory, "a/b", &Recipe::default()).unwrap();
+        let second = save(&rgba, size, &directory, "a/b", &Recipe::default()).unwrap();
         assert!(first.ends_with("a_b_1.png") && second.ends_with("a_b_2.png"));
         let read = image::open(&first).unwrap().to_rgb8();
         assert_eq!(read.into_raw(), [10, 20, 30, 40, 50, 60]);
         std::fs::remove_dir_all(&directory).unwrap();
-        assert!(save(&rgba, size, &directory, "a").unwrap_err().contains("a_1.png"));
+        assert!(save(&rgba, size, &directory, "a", &Recipe::default()).unwrap_err().contains("a_1.png"));
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! The window's thread: events in, pictures out, never a wait.
 
-use super::engine::{Engine, Published, Wake, lock};
-use super::hud::{Canvas, Level, Measured, Place, Status, status_lines, text_scale};
-use super::input::Command;
-use super::keymap::{self, Action, Hold, Tap};
-use super::screen::{Presented, Screen, vector};
-use super::{ViewError, ViewOptions, screenshot};
+use super::chord::Letters;
+use super::debug::layer::Layer;
+use super::engine::{Engine, Published, Wake};
+use super::input::{Command, Drag};
+use super::keymap::Hold;
+use super::screen::{Screen, vector};
+use super::status::Status;
+use super::ui::Ui;
+use super::{Response, ViewError, ViewOptions};
 use crate::app::App;
 use crate::image::Picture;
 use glam::{DVec2, UVec2};
@@ -18,74 +21,76 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalPosition;
-use winit::event::{
-    DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent,
-};
+use winit::event::{DeviceEvent, DeviceId, ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
-use winit::keyboard::{KeyCode, PhysicalKey};
-use winit::window::{CursorGrabMode, WindowId};
+use winit::keyboard::KeyCode;
+use winit::window::WindowId;
 
 /// A resize storm reaches the engine after this pause in it, ...
 const RESIZE_PAUSE: Duration = Duration::from_millis(80);
 /// ... or after this time.
 const RESIZE_PATIENCE: Duration = Duration::from_millis(400);
-/// Between pictures of a view that rests, if presenting takes CPU time from tracing.
-const SOFTWARE_PACE: Duration = Duration::from_millis(80);
-/// Between changes of the title.
-const TITLE_PACE: Duration = Duration::from_millis(500);
 /// How long a notice stays.
 const NOTICE: Duration = Duration::from_secs(6);
 /// How long a closing window waits for the engine to stop.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// Latencies that the median is taken of.
-const LATENCIES: usize = 31;
-/// Pixels of a touchpad that count as a notch of a wheel.
-const PIXELS_PER_NOTCH: f64 = 40.0;
 
 /// Makes the app, on the engine's thread.
 pub type Open = Box<dyn FnOnce() -> Result<App, String> + Send>;
 
 /// The window's side of everything.
 pub struct Viewer {
-    options: ViewOptions,
-    proxy: EventLoopProxy<Wake>,
-    open: Option<Open>,
-    screen: Option<Screen>,
-    engine: Option<Link>,
-    failure: Option<ViewError>,
-    keys: HashSet<KeyCode>,
-    held: [bool; Hold::COUNT],
-    drag: Option<PhysicalPosition<f64>>,
-    cursor: PhysicalPosition<f64>,
-    visible: bool,
-    picture: Picture,
-    status: Option<Status>,
-    moving: bool,
-    asked: Option<Instant>,
-    level: Level,
-    help: bool,
-    notice: String,
-    title: String,
-    titled_at: Option<Instant>,
-    presented: VecDeque<Instant>,
-    latencies: VecDeque<Duration>,
-    resizing: Option<(UVec2, Instant)>,
-    due: Due,
-    writers: Vec<JoinHandle<()>>,
+    pub(super) options: ViewOptions,
+    pub(super) proxy: EventLoopProxy<Wake>,
+    pub(super) open: Option<Open>,
+    pub(super) screen: Option<Screen>,
+    pub(super) engine: Option<Link>,
+    pub(super) failure: Option<ViewError>,
+    pub(super) keys: HashSet<KeyCode>,
+    pub(super) held: [bool; Hold::COUNT],
+    /// What the mouse does, and where it began.
+    pub(super) drag: Option<(Drag, PhysicalPosition<f64>)>,
+    /// Whether it has gone far enough to be no click.
+    pub(super) dragged: bool,
+    pub(super) cursor: PhysicalPosition<f64>,
+    pub(super) cursor_inside: bool,
+    pub(super) letters: Letters,
+    pub(super) visible: bool,
+    pub(super) picture: Picture,
+    /// To compare with.
+    pub(super) kept: Option<Picture>,
+    pub(super) layer: Option<Arc<Layer>>,
+    pub(super) status: Option<Status>,
+    pub(super) moving: bool,
+    pub(super) asked: Option<Instant>,
+    pub(super) ui: Ui,
+    pub(super) notice: String,
+    /// What was copied is there as long as this is.
+    clipboard: Option<arboard::Clipboard>,
+    pub(super) title: String,
+    pub(super) titled_at: Option<Instant>,
+    pub(super) presented: VecDeque<Instant>,
+    pub(super) latencies: VecDeque<Duration>,
+    /// All of them, and pictures in all, for who asks at the end.
+    pub(super) response: Response,
+    pub(super) resizing: Option<(UVec2, Instant)>,
+    pub(super) due: Due,
+    pub(super) writers: Vec<JoinHandle<()>>,
 }
 
 /// What is to happen later, and when.
 #[derive(Clone, Copy, Debug, Default)]
-struct Due {
-    redraw: Option<Instant>,
-    resize: Option<Instant>,
-    notice: Option<Instant>,
-    exit: Option<Instant>,
+pub(super) struct Due {
+    pub(super) redraw: Option<Instant>,
+    pub(super) replay: Option<Instant>,
+    pub(super) resize: Option<Instant>,
+    pub(super) notice: Option<Instant>,
+    pub(super) exit: Option<Instant>,
 }
 
 impl Due {
     fn next(self) -> Option<Instant> {
-        [self.redraw, self.resize, self.notice, self.exit].into_iter().flatten().min()
+        [self.redraw, self.replay, self.resize, self.notice, self.exit].into_iter().flatten().min()
     }
 }
 
@@ -95,12 +100,12 @@ fn is_due(at: &mut Option<Instant>, now: Instant) -> bool {
 }
 
 /// The window's ends of what connects it with the engine.
-struct Link {
-    commands: Sender<Command>,
-    interrupt: Arc<AtomicBool>,
-    published: Arc<Mutex<Published>>,
+pub(super) struct Link {
+    pub(super) commands: Sender<Command>,
+    pub(super) interrupt: Arc<AtomicBool>,
+    pub(super) published: Arc<Mutex<Published>>,
     /// Disconnected when the engine's thread has ended.
-    ended: Receiver<Infallible>,
+    pub(super) ended: Receiver<Infallible>,
 }
 
 impl Viewer {
@@ -117,19 +122,25 @@ impl Viewer {
             keys: HashSet::new(),
             held: [false; Hold::COUNT],
             drag: None,
+            dragged: false,
             cursor: PhysicalPosition::default(),
+            cursor_inside: false,
+            letters: Letters::default(),
             visible: true,
             picture: Picture::default(),
+            kept: None,
+            layer: None,
             status: None,
             moving: true,
             asked: None,
-            level: Level::default(),
-            help: false,
+            ui: Ui::default(),
             notice: String::new(),
+            clipboard: None,
             title: String::new(),
             titled_at: None,
             presented: VecDeque::new(),
             latencies: VecDeque::new(),
+            response: Response::default(),
             resizing: None,
             due: Due::default(),
             writers: Vec::new(),
@@ -140,12 +151,13 @@ impl Viewer {
     ///
     /// # Errors
     /// What ended the window, if it was not the user.
-    pub fn finish(self) -> Result<(), ViewError> {
-        for writer in self.writers {
+    pub fn finish(mut self) -> Result<Response, ViewError> {
+        self.response = self.measured_response();
+        for writer in std::mem::take(&mut self.writers) {
             // It said itself what it could not write.
             let _ = writer.join();
         }
-        if let Some(engine) = self.engine {
+        if let Some(engine) = self.engine.take() {
             let _ = engine.commands.send(Command::Quit);
             engine.interrupt.store(true, Ordering::SeqCst);
             // A scene that still loads cannot be interrupted, and has nothing to tidy up.
@@ -153,10 +165,10 @@ impl Viewer {
                 let _: Result<Infallible, RecvTimeoutError> = engine.ended.recv_timeout(FAREWELL);
             }
         }
-        self.failure.map_or(Ok(()), Err)
+        self.failure.map_or(Ok(self.response), Err)
     }
 
-    fn fail(&mut self, event_loop: &ActiveEventLoop, error: ViewError) {
+    pub(super) fn fail(&mut self, event_loop: &ActiveEventLoop, error: ViewError) {
         self.failure.get_or_insert(error);
         event_loop.exit();
     }
@@ -168,8 +180,11 @@ impl Viewer {
         let interrupt = Arc::new(AtomicBool::new(false));
         let published = Arc::new(Mutex::new(Published::default()));
         let proxy = self.proxy.clone();
+        let reference = self.options.reference.take();
         let engine = Engine {
+            reference,
             commands: receiver,
+            own: commands.clone(),
             interrupt: Arc::clone(&interrupt),
             published: Arc::clone(&published),
             // The event loop is gone: so is who would look.
@@ -187,7 +202,7 @@ impl Viewer {
         }
     }
 
-    fn send(&self, command: Command) {
+    pub(super) fn send(&self, command: Command) {
         if let Some(engine) = &self.engine {
             // An engine that has ended has said why by an event.
             let _ = engine.commands.send(command);
@@ -195,132 +210,20 @@ impl Viewer {
         }
     }
 
-    /// Takes what the engine has published.
-    fn take_published(&mut self) {
-        let Some(engine) = &self.engine else { return };
-        let mut published = lock(&engine.published);
-        if let Some(picture) = published.picture.take() {
-            published.spare = std::mem::replace(&mut self.picture, picture);
-            self.asked = self.asked.or(published.asked.take());
+    /// Puts `text` on the clipboard, and says so.
+    fn copy(&mut self, text: String) {
+        if self.clipboard.is_none() {
+            self.clipboard = arboard::Clipboard::new().ok();
         }
-        self.moving = published.moving;
-        self.status.clone_from(&published.status);
+        let copied =
+            self.clipboard.as_mut().is_some_and(|clipboard| clipboard.set_text(text.clone()).is_ok());
+        self.say(if copied { format!("copied: {text}") } else { text });
     }
 
-    /// Presents at once, or later if nobody misses it and it costs CPU time.
-    fn redraw_in_time(&mut self) {
-        let Some(screen) = &self.screen else { return };
-        let at_rest =
-            screen.software && !self.moving && self.status.as_ref().is_some_and(|s| !s.done && !s.paused);
-        let last = self.presented.back().copied();
-        match last.map(|last| last + SOFTWARE_PACE).filter(|&next| at_rest && next > Instant::now()) {
-            Some(next) => {
-                self.due.redraw.get_or_insert(next);
-            }
-            None => screen.window.request_redraw(),
-        }
-    }
-
-    fn redraw(&mut self) {
-        if let Some(screen) = &self.screen {
-            screen.window.request_redraw();
-        }
-    }
-
-    fn say(&mut self, text: String) {
+    pub(super) fn say(&mut self, text: String) {
         self.notice = text;
         self.due.notice = Some(Instant::now() + NOTICE);
         self.redraw();
-    }
-
-    fn draw(&mut self, event_loop: &ActiveEventLoop) {
-        self.take_published();
-        self.due.redraw = None;
-        let measured = self.measured();
-        if !self.visible {
-            return;
-        }
-        let Some(screen) = &mut self.screen else {
-            return;
-        };
-        let scale_factor = screen.window.scale_factor();
-        let lines = match &self.status {
-            Some(status) => status_lines(self.level, status, measured),
-            None => Vec::new(),
-        };
-        let loading =
-            self.status.is_none().then(|| [format!("loading {} ...", self.options.screenshot_stem)]);
-        let outcome = screen.draw(|bytes, size| {
-            if self.picture.rgba.is_empty() {
-                bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
-            } else {
-                screenshot::scale_into(&self.picture.rgba, self.picture.size, bytes, size);
-            }
-            let mut canvas = Canvas::new(bytes, size, text_scale(scale_factor, size.y));
-            canvas.write(Place::Top, &lines);
-            if let Some(loading) = &loading {
-                canvas.write(Place::Middle, loading);
-            }
-            if self.help {
-                canvas.write_help();
-            }
-            if !self.notice.is_empty() {
-                canvas.write(Place::Bottom, std::slice::from_ref(&self.notice));
-            }
-        });
-        let now = Instant::now();
-        match outcome {
-            Presented::Yes => self.was_presented(now),
-            Presented::Later(pause) => self.due.redraw = Some(now + pause),
-            Presented::Lost(why) => self.fail(event_loop, ViewError::Lost(why)),
-        }
-    }
-
-    fn was_presented(&mut self, now: Instant) {
-        self.presented.push_back(now);
-        if let Some(asked) = self.asked.take() {
-            self.latencies.push_back(now - asked);
-            if self.latencies.len() > LATENCIES {
-                self.latencies.pop_front();
-            }
-        }
-        let title = match &self.status {
-            None => format!("{} - loading", self.options.title),
-            Some(s) if s.done => format!("{} - done", self.options.title),
-            Some(s) if s.paused => format!("{} - paused", self.options.title),
-            Some(s) => {
-                format!("{} - {:.0} of {}", self.options.title, s.samples_per_pixel.floor(), s.sample_target)
-            }
-        };
-        let is_final = self.status.as_ref().is_none_or(|s| s.done || s.paused);
-        let long_ago = self.titled_at.is_none_or(|at| now - at > TITLE_PACE);
-        if title != self.title
-            && (is_final || long_ago)
-            && let Some(screen) = &self.screen
-        {
-            screen.window.set_title(&title);
-            self.title = title;
-            self.titled_at = Some(now);
-        }
-    }
-
-    fn measured(&mut self) -> Measured {
-        let now = Instant::now();
-        while self.presented.front().is_some_and(|&at| now - at > Duration::from_secs(1))
-            && self.presented.len() > 1
-        {
-            self.presented.pop_front();
-        }
-        let pictures_per_second = match (self.presented.front(), self.presented.back()) {
-            (Some(&first), Some(&last)) if last > first => {
-                (self.presented.len() - 1) as f64 / (last - first).as_secs_f64()
-            }
-            _ => 0.0,
-        };
-        let mut sorted: Vec<Duration> = self.latencies.iter().copied().collect();
-        sorted.sort_unstable();
-        let latency = sorted.get(sorted.len() / 2).map(Duration::as_secs_f64);
-        Measured { pictures_per_second, latency }
     }
 
     fn resized(&mut self, size: UVec2) {
@@ -340,128 +243,6 @@ impl Viewer {
         self.resizing = Some((size, since));
         self.due.resize = Some((now + RESIZE_PAUSE).min(since + RESIZE_PATIENCE));
         self.redraw();
-    }
-
-    fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent, is_synthetic: bool) {
-        let PhysicalKey::Code(code) = event.physical_key else {
-            return;
-        };
-        let control = self.held[Hold::Control as usize];
-        if event.state == ElementState::Released {
-            self.keys.remove(&code);
-            return self.hold();
-        }
-        let Some(binding) = keymap::lookup(code, control) else {
-            return;
-        };
-        match binding.action {
-            // Keys that are down when the window gets the focus were meant for somebody else.
-            action if is_synthetic && !keymap::is_modifier(action) => {}
-            Action::Hold(_) => {
-                self.keys.insert(code);
-                self.hold();
-            }
-            Action::Tap(_) if event.repeat && !binding.repeats => {}
-            Action::Tap(tap) => self.tap(event_loop, tap),
-        }
-    }
-
-    /// Tells the engine what is held, if that is something else than before.
-    fn hold(&mut self) {
-        let mut held = [false; Hold::COUNT];
-        for code in &self.keys {
-            if let Some(Action::Hold(hold)) = keymap::lookup(*code, false).map(|b| b.action) {
-                held[hold as usize] = true;
-            }
-        }
-        if held != self.held {
-            self.held = held;
-            self.send(Command::Held { held, at: Instant::now() });
-        }
-    }
-
-    fn tap(&mut self, event_loop: &ActiveEventLoop, tap: Tap) {
-        match tap {
-            Tap::HudLevel => self.level = self.level.next(),
-            Tap::Help => self.help = !self.help,
-            Tap::Escape => self.help = false,
-            Tap::Quit => event_loop.exit(),
-            Tap::FullScreen => {
-                if let Some(screen) = &self.screen {
-                    screen.toggle_full_screen();
-                }
-            }
-            Tap::Screenshot | Tap::ScreenshotWithHud => {
-                self.save_screenshot(tap == Tap::ScreenshotWithHud);
-            }
-            tap => {
-                let shift = self.held[Hold::Fast as usize];
-                return self.send(Command::Tap { tap, shift, at: Instant::now() });
-            }
-        }
-        self.redraw();
-    }
-
-    /// Writes a file on a thread of its own.
-    fn save_screenshot(&mut self, with_hud: bool) {
-        let Some(screen) = &self.screen else { return };
-        let size = screen.size();
-        let bytes = if with_hud {
-            screen.bytes().to_vec()
-        } else if self.picture.rgba.is_empty() {
-            return self.say("there is no picture yet".to_owned());
-        } else {
-            self.take_published();
-            let mut bytes = vec![0; size.element_product() as usize * 4];
-            screenshot::scale_into(&self.picture.rgba, self.picture.size, &mut bytes, size);
-            bytes
-        };
-        let stem = self.options.screenshot_stem.clone();
-        let proxy = self.proxy.clone();
-        let writer = std::thread::spawn(move || {
-            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem) {
-                Ok(path) => format!("saved {}", path.display()),
-                Err(why) => format!("no screenshot: {why}"),
-            };
-            drop(proxy.send_event(Wake::Notice(said)));
-        });
-        self.writers.retain(|writer| !writer.is_finished());
-        self.writers.push(writer);
-    }
-
-    /// Begins or ends looking around with the mouse.
-    fn set_drag(&mut self, on: bool) {
-        let Some(screen) = &self.screen else { return };
-        if on && self.drag.is_none() {
-            self.drag = Some(self.cursor);
-            // X11 cannot lock the pointer: it is put back to the middle instead. Confining it as well
-            // would deliver each of its motions twice.
-            let _ = screen.window.set_cursor_grab(CursorGrabMode::Locked);
-            screen.window.set_cursor_visible(false);
-        } else if !on && let Some(start) = self.drag.take() {
-            let _ = screen.window.set_cursor_position(start);
-            let _ = screen.window.set_cursor_grab(CursorGrabMode::None);
-            screen.window.set_cursor_visible(true);
-        }
-    }
-
-    fn cursor_moved(&mut self, to: PhysicalPosition<f64>) {
-        self.cursor = to;
-        let (Some(_), Some(screen)) = (self.drag, &self.screen) else {
-            return;
-        };
-        let middle = screen.size().as_dvec2() / 2.0;
-        let off = (DVec2::new(to.x, to.y) - middle).abs();
-        if off.cmpgt(middle / 2.0).any() {
-            // Where the pointer is locked there is nothing to put back.
-            let _ = screen.window.set_cursor_position(PhysicalPosition::new(middle.x, middle.y));
-        }
-    }
-
-    fn leave(&mut self) {
-        self.keys.clear();
-        self.hold();
-        self.set_drag(false);
     }
 }
 
@@ -487,9 +268,19 @@ impl ApplicationHandler<Wake> for Viewer {
         match wake {
             Wake::FrameReady => {
                 self.take_published();
+                if let Some(recorder) = &mut self.options.record {
+                    recorder.begin();
+                }
                 self.redraw_in_time();
             }
             Wake::Notice(text) => self.say(text),
+            Wake::Copy(text) => self.copy(text),
+            Wake::Opened(name) => {
+                self.options.title = format!("Penumbra – {name}");
+                self.options.screenshot_stem = name;
+                self.redraw();
+            }
+            Wake::Reference(picture) => self.kept = Some(picture),
             Wake::OpenFailed(why) => self.fail(event_loop, ViewError::Scene(why)),
             Wake::Crashed(why) => self.fail(event_loop, ViewError::Lost(format!("internal error: {why}"))),
         }
@@ -510,31 +301,29 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.redraw();
             }
             WindowEvent::Focused(false) => self.leave(),
+            WindowEvent::DroppedFile(path) => self.send(Command::Open(path)),
             WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
                 self.key(event_loop, &event, is_synthetic);
             }
-            WindowEvent::MouseInput { state, button: MouseButton::Right, .. } => {
-                self.set_drag(state == ElementState::Pressed);
+            WindowEvent::MouseInput { state, button, .. } => {
+                self.button(button, state == ElementState::Pressed);
             }
             WindowEvent::CursorMoved { position, .. } => self.cursor_moved(position),
-            WindowEvent::MouseWheel { delta, .. } => self.send(Command::Wheel(match delta {
-                MouseScrollDelta::LineDelta(_, y) => f64::from(y),
-                MouseScrollDelta::PixelDelta(p) => p.y / PIXELS_PER_NOTCH,
-            })),
+            WindowEvent::CursorLeft { .. } => self.cursor_inside = false,
+            WindowEvent::MouseWheel { delta, .. } => self.wheel(delta),
             _ => {}
         }
     }
 
     fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
-        if let DeviceEvent::MouseMotion { delta: (x, y) } = event
-            && self.drag.is_some()
-        {
-            self.send(Command::Look { pixels: DVec2::new(x, y), at: Instant::now() });
+        if let DeviceEvent::MouseMotion { delta: (x, y) } = event {
+            self.mouse_moved(DVec2::new(x, y));
         }
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let now = Instant::now();
+        self.replay(event_loop, now);
         if is_due(&mut self.due.redraw, now) {
             self.redraw();
         }

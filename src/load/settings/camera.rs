@@ -3,7 +3,7 @@
 use super::{Check, Settings};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
-use crate::scene::{Camera, Projection, Transform};
+use crate::scene::{Camera, Lens, Projection, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use serde::Deserialize;
@@ -17,6 +17,8 @@ pub(super) struct CameraTable {
     up: Option<[f64; 3]>,
     vertical_fov: Option<f32>,
     orthographic_height: Option<f32>,
+    lens_radius: Option<f32>,
+    focus_distance: Option<f32>,
 }
 
 pub(super) fn spawn(
@@ -47,11 +49,25 @@ pub(super) fn spawn(
         }
         (None, None) => Camera::default().projection,
     };
+    let lens = match (camera.lens_radius, camera.focus_distance) {
+        (Some(radius), focus) => Some(Lens {
+            radius: check.length("lens_radius", radius),
+            focus: check.length("focus_distance", focus.unwrap_or((target - eye).length() as f32)),
+        }),
+        (None, Some(_)) => {
+            check.that(false, || "has focus_distance but no lens_radius".to_owned());
+            None
+        }
+        (None, None) => None,
+    };
     if let Some(problem) = check.problem {
         return Err(settings.broken(table, "[camera]", problem));
     }
     let name = "camera";
     let entity = sink.spawn((Name::new(name), Transform::looking_at(eye, target, up), Camera { projection }));
+    if let Some(lens) = lens {
+        sink.world.entity_mut(entity).insert(lens);
+    }
     sink.report.cameras.insert(0, (name.to_owned(), entity));
     Ok(entity)
 }

@@ -50,6 +50,8 @@
 //! target = [0, 1, 0]           # *
 //! up = [0, 1, 0]
 //! vertical_fov = 40.0          # degrees, 45 if missing; or orthographic_height in scene units
+//! lens_radius = 0.05           # scene units; missing: all is sharp
+//! focus_distance = 4.0         # of what is sharp, scene units; that of the target if missing
 //!
 //! [render]
 //! integrator = "path"          # or "direct"
@@ -59,9 +61,20 @@
 //! resolution = [640, 480]
 //! seed = 0
 //! filter = "file"              # textures: "nearest", "bilinear", or as the file says
+//!
+//! # [[edit]] origin = [0, 0, 0]: where coordinates are counted from, so that rounding stays the same
+//! [[edit]]                     # as the window writes it: what was changed, by the names on the way to it
+//! entity = ["room", "chair#2"] # * the second chair of the room
+//! copy_of = ["room", "chair"]  # it is made first, as a copy of this one
+//! matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] # in its parent, rows first
+//! hidden = false
+//! light = { spectra = [[1, 1, 1]], sizes = [0.5] } # of the light that it is
+//! slot = 0                     # which of its materials is meant below
+//! material = { base_color = [0.7, 0.7, 0.7], roughness = 0.5 } # also metallic, specular, exponent, mirror, emission
 //! ```
 
 mod camera;
+pub mod edit;
 mod light;
 mod material;
 mod model;
@@ -96,6 +109,9 @@ pub struct SidecarRender {
     pub seed: Option<u64>,
     /// Texture filter.
     pub filter: Option<SidecarFilter>,
+    /// See [`edit::EditTable::origin`].
+    #[serde(skip)]
+    pub origin: Option<[f64; 3]>,
 }
 
 /// `integrator` of the `[render]` table.
@@ -139,6 +155,8 @@ struct Tables {
     light: Vec<Spanned<light::LightTable>>,
     camera: Option<Spanned<camera::CameraTable>>,
     render: Option<Spanned<SidecarRender>>,
+    #[serde(default)]
+    edit: Vec<Spanned<edit::EditTable>>,
 }
 
 impl Settings {
@@ -189,6 +207,11 @@ impl Settings {
     /// Spawns the lights.
     pub(super) fn spawn_lights(&self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
         self.tables.light.iter().enumerate().try_for_each(|(i, table)| light::spawn(self, i, table, sink))
+    }
+
+    /// Changes what the `[[edit]]` tables say.
+    pub(super) fn apply_edits(&self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+        edit::apply_all(self, sink)
     }
 
     fn check_render(&self, table: &Spanned<SidecarRender>) -> Result<(), LoadError> {

@@ -1,0 +1,214 @@
+//! Places to look from: the file's cameras, the sides of the scene, bookmarks; and kinds of projection.
+
+use super::controls::{Notice, Notices};
+use super::fly::{FlyCamera, FlyCameraState};
+use super::input::Input;
+use super::keymap::{Side, Tap};
+use super::orbit::{Navigation, pivot_depth};
+use crate::scene::{ActiveCamera, Camera, Lens, Projection, SceneBounds, Transform};
+use bevy_ecs::prelude::*;
+use glam::{DVec2, DVec3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Which cameras of the file were looked through.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub struct FileCameras {
+    /// The one that the window opened with.
+    pub home: Entity,
+    /// The last one.
+    pub last: Entity,
+}
+
+/// Places that the user remembers.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Bookmarks([Option<Bookmark>; 9]);
+
+#[derive(Clone, Copy, Debug)]
+struct Bookmark {
+    camera: Camera,
+    transform: Transform,
+    lens: Option<Lens>,
+    pivot: DVec3,
+}
+
+/// Shows the file's next or previous camera, or the first one again.
+pub fn choose_camera(
+    input: Res<Input>,
+    cameras: Query<Entity, (With<Camera>, With<Name>, Without<FlyCamera>)>,
+    mut seen: ResMut<FileCameras>,
+    mut active: ResMut<ActiveCamera>,
+) {
+    let mut camera = input.count(Tap::ResetCamera).gt(&0).then_some(seen.home);
+    let steps = input.count(Tap::NextCamera) as i64 - input.count(Tap::PreviousCamera) as i64;
+    if steps != 0 {
+        let mut cameras: Vec<Entity> = cameras.iter().collect();
+        cameras.sort_by_key(|camera| camera.index_u32());
+        let here =
+            cameras.iter().position(|&c| c == seen.last).map_or(if steps > 0 { -1 } else { 0 }, |i| i as i64);
+        let there = (here + steps).checked_rem_euclid(cameras.len() as i64);
+        camera = there.and_then(|there| cameras.get(there as usize).copied()).or(camera);
+    }
+    if let Some(camera) = camera {
+        seen.last = camera;
+        active.set_if_neq(ActiveCamera(camera));
+    }
+}
+
+/// Looks from a side at the pivot, or at the whole scene.
+pub fn choose_side(
+    input: Res<Input>,
+    bounds: Option<Res<SceneBounds>>,
+    mut navigation: ResMut<Navigation>,
+    mut cameras: Query<(&mut FlyCameraState, &mut Transform, &mut Camera), With<FlyCamera>>,
+) {
+    for (mut state, mut transform, mut camera) in &mut cameras {
+        for press in &input.taps {
+            let mut moved = *transform;
+            let mut distance = (moved.0.translation - navigation.pivot).length();
+            match press.tap {
+                Tap::View(side) => state.set_if_neq(looking_from(side)),
+                Tap::FrameAll => {
+                    let Some(bounds) = &bounds else { continue };
+                    navigation.pivot = bounds.center;
+                    distance = frame(&mut camera, bounds.radius);
+                    true
+                }
+                _ => continue,
+            };
+            moved.0.matrix3 = state.world_from_camera();
+            moved.0.translation = navigation.pivot + moved.0.matrix3.z_axis * distance;
+            transform.set_if_neq(moved);
+        }
+    }
+}
+
+/// How far a camera must be from a ball of this radius to see it whole; a parallel projection is made fit.
+fn frame(camera: &mut Mut<Camera>, radius: f64) -> f64 {
+    match camera.projection {
+        Projection::Perspective { vertical_fov } => radius / (0.5 * f64::from(vertical_fov)).sin(),
+        Projection::Orthographic { .. } => {
+            camera.projection = Projection::Orthographic { height: 2.0 * radius as f32 };
+            2.0 * radius
+        }
+    }
+}
+
+fn looking_from(side: Side) -> FlyCameraState {
+    let (yaw, pitch) = match side {
+        Side::Front => (0.0, 0.0),
+        Side::Back => (PI, 0.0),
+        Side::Right => (FRAC_PI_2, 0.0),
+        Side::Left => (-FRAC_PI_2, 0.0),
+        Side::Top => (0.0, -FRAC_PI_2),
+        Side::Bottom => (0.0, FRAC_PI_2),
+    };
+    // The same angle as turning there would give.
+    FlyCameraState { yaw, pitch }.turned(DVec2::ZERO)
+}
+
+/// Perspective or parallel, so that what is as far as the pivot stays as large.
+pub fn change_projection(
+    input: Res<Input>,
+    mut navigation: ResMut<Navigation>,
+    mut cameras: Query<(&mut Camera, &mut Transform), With<FlyCamera>>,
+) {
+    if input.count(Tap::Orthographic).is_multiple_of(2) {
+        return;
+    }
+    for (mut camera, mut transform) in &mut cameras {
+        let depth = pivot_depth(&transform, navigation.pivot);
+        match camera.projection {
+            Projection::Perspective { vertical_fov } => {
+                navigation.vertical_fov = vertical_fov;
+                let height = 2.0 * depth * (0.5 * f64::from(vertical_fov)).tan();
+                camera.projection = Projection::Orthographic { height: height as f32 };
+            }
+            Projection::Orthographic { height } => {
+                let vertical_fov = navigation.vertical_fov;
+                camera.projection = Projection::Perspective { vertical_fov };
+                let wanted = 0.5 * f64::from(height) / (0.5 * f64::from(vertical_fov)).tan();
+                let back = transform.0.matrix3.z_axis;
+                transform.0.translation += back * (wanted - depth);
+            }
+        }
+    }
+}
+
+/// A larger or smaller lens, in steps of √2. It is sharp at the pivot when it first opens.
+pub fn change_lens(
+    input: Res<Input>,
+    navigation: Res<Navigation>,
+    cameras: Query<(Entity, &Transform, Option<&Lens>), With<FlyCamera>>,
+    mut commands: Commands,
+    mut notices: ResMut<Notices>,
+) {
+    let steps = input.count(Tap::OpenLens) as i32 - input.count(Tap::CloseLens) as i32;
+    if steps == 0 {
+        return;
+    }
+    for (entity, transform, lens) in &cameras {
+        let focus = lens.map_or_else(|| pivot_depth(transform, navigation.pivot) as f32, |lens| lens.focus);
+        // The smallest lens blurs by a pixel or so.
+        let smallest = focus / 512.0;
+        let old = lens.map_or(smallest / 2f32.sqrt(), |lens| lens.radius);
+        let radius = old * 2f32.powf(0.5 * steps as f32);
+        let said = if radius < smallest * 0.99 {
+            commands.entity(entity).remove::<Lens>();
+            "lens closed: all is sharp".to_owned()
+        } else {
+            let radius = radius.min(focus);
+            commands.entity(entity).insert(Lens { radius, focus });
+            format!("lens radius {radius:.4}, sharp at {focus:.3} (F: at the cursor)")
+        };
+        notices.0.push(Notice::Text(said));
+    }
+}
+
+/// Goes to a bookmark.
+pub fn recall(
+    input: Res<Input>,
+    bookmarks: Res<Bookmarks>,
+    mut navigation: ResMut<Navigation>,
+    mut cameras: Query<(Entity, &mut Camera, &mut Transform, &mut FlyCameraState), With<FlyCamera>>,
+    mut commands: Commands,
+    mut notices: ResMut<Notices>,
+) {
+    for press in &input.taps {
+        let Tap::Recall(number) = press.tap else { continue };
+        let Some(Some(bookmark)) = bookmarks.0.get(usize::from(number) - 1) else {
+            notices.0.push(Notice::Text(format!("bookmark {number} is empty: Ctrl+Shift+{number} sets it")));
+            continue;
+        };
+        navigation.pivot = bookmark.pivot;
+        for (entity, mut camera, mut transform, mut state) in &mut cameras {
+            camera.set_if_neq(bookmark.camera);
+            transform.set_if_neq(bookmark.transform);
+            state.set_if_neq(FlyCameraState::of(bookmark.transform.0.matrix3));
+            match bookmark.lens {
+                Some(lens) => commands.entity(entity).insert(lens),
+                None => commands.entity(entity).remove::<Lens>(),
+            };
+        }
+    }
+}
+
+/// Sets a bookmark.
+pub fn remember(
+    input: Res<Input>,
+    active: Res<ActiveCamera>,
+    navigation: Res<Navigation>,
+    cameras: Query<(&Camera, &crate::scene::GlobalTransform, Option<&Lens>)>,
+    mut bookmarks: ResMut<Bookmarks>,
+    mut notices: ResMut<Notices>,
+) {
+    for press in &input.taps {
+        if let Tap::Remember(number) = press.tap
+            && let Ok((camera, pose, lens)) = cameras.get(active.0)
+        {
+            let transform = Transform(pose.0);
+            bookmarks.0[usize::from(number) - 1] =
+                Some(Bookmark { camera: *camera, transform, lens: lens.copied(), pivot: navigation.pivot });
+            notices.0.push(Notice::Text(format!("bookmark {number} set")));
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! What is drawn into the scene: rays of a pixel, boxes of the hierarchy, the steps of a ray through it.
+
+pub mod boxes;
+pub mod layer;
+
+use super::controls::{Notice, Notices};
+use super::input::{Input, Press};
+use super::keymap::Tap;
+use super::pixel_view::{DepthWanted, FirstHits};
+use crate::bvh::inspect::{Order, Step, Visited, Visits};
+use crate::bvh::{Hit, Tlas};
+use crate::scene::SceneBounds;
+use crate::sync::Redone;
+use crate::trace::explain::{Explanation, Kind, explain};
+use crate::trace::{Coverage, Film, Geometry, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use bevy_ecs::prelude::*;
+use boxes::{Boxes, Placed, Statistics};
+use glam::{DVec2, UVec2};
+use layer::{Layer, Line};
+use std::sync::Arc;
+
+/// Samples that a pixel is explained by.
+const SAMPLES: u32 = 32;
+
+/// What the user wants to see in the scene.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Debug {
+    /// Whether clicks pin pixels.
+    pinning: bool,
+    /// The pixel that is explained, and from where it was looked at.
+    pinned: Option<(UVec2, Viewpoint)>,
+    boxes: Boxes,
+    /// Level to return to.
+    level: u32,
+    order: Order,
+    /// How many steps of the pinned pixel's camera ray are shown; 0 for none.
+    step: usize,
+    told: Option<Arc<Told>>,
+    statistics: Option<Arc<Statistics>>,
+}
+
+/// What is told about the pinned pixel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Told {
+    /// Its samples.
+    pub explanation: Explanation,
+    /// Steps of the first camera ray, in both orders.
+    pub steps: [Vec<Step>; 2],
+    /// What both orders cost.
+    pub visits: [Visits; 2],
+    /// What the ray hits.
+    pub hit: Option<Hit>,
+}
+
+/// What the cards show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DebugStatus {
+    /// The pinned pixel.
+    pub told: Option<Arc<Told>>,
+    /// Which order's steps are shown, and up to which one.
+    pub order: Order,
+    /// 0 if none.
+    pub step: usize,
+    /// Which boxes are shown.
+    pub boxes: Boxes,
+    /// Of the hierarchy, if boxes are shown.
+    pub statistics: Option<Arc<Statistics>>,
+}
+
+/// What is drawn over the picture, if anything.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct CurrentLayer(pub Option<Arc<Layer>>);
+
+impl Debug {
+    /// For the cards.
+    #[must_use]
+    pub fn status(&self) -> DebugStatus {
+        DebugStatus {
+            told: self.told.clone(),
+            order: self.order,
+            step: self.step,
+            boxes: self.boxes,
+            statistics: self.statistics.clone(),
+        }
+    }
+
+    fn press(
+        &mut self,
+        press: &Press,
+        viewpoint: &Viewpoint,
+        size: UVec2,
+        levels: u32,
+    ) -> Option<&'static str> {
+        match press.tap {
+            Tap::Pin => {
+                self.pinning = !self.pinning;
+                (self.pinned, self.step) = (None, 0);
+                if self.pinning {
+                    self.pin(press.cursor, viewpoint, size);
+                    return Some("click a pixel to see its rays");
+                }
+            }
+            Tap::Click if self.pinning => self.pin(press.cursor, viewpoint, size),
+            Tap::Boxes => {
+                self.boxes = match self.boxes {
+                    Boxes::Off => Boxes::Level(self.level),
+                    Boxes::Level(_) => Boxes::Leaves,
+                    Boxes::Leaves => Boxes::Off,
+                };
+            }
+            Tap::LevelUp | Tap::LevelDown => {
+                let down = press.tap == Tap::LevelDown;
+                let next = if down { self.level + 1 } else { self.level.saturating_sub(1) };
+                self.level = next.min(levels.saturating_sub(1));
+                self.boxes = Boxes::Level(self.level);
+            }
+            Tap::NextStep => self.step += 1,
+            Tap::PreviousStep => self.step = self.step.saturating_sub(1),
+            Tap::Order => {
+                self.order = match self.order {
+                    Order::NearFirst => Order::Queue,
+                    Order::Queue => Order::NearFirst,
+                };
+                return Some(match self.order {
+                    Order::NearFirst => "order: near first, with a stack",
+                    Order::Queue => "order: priority queue",
+                });
+            }
+            _ => {}
+        }
+        None
+    }
+
+    fn pin(&mut self, cursor: DVec2, viewpoint: &Viewpoint, size: UVec2) {
+        let pixel = (cursor * size.as_dvec2()).as_uvec2().min(size.max(UVec2::ONE) - 1);
+        self.pinned = Some((pixel, *viewpoint));
+        self.step = 0;
+    }
+}
+
+/// Keys and clicks.
+pub fn change_debug(
+    input: Res<Input>,
+    viewpoint: Res<Viewpoint>,
+    settings: Res<RenderSettings>,
+    mut debug: ResMut<Debug>,
+    mut depth_wanted: ResMut<DepthWanted>,
+    mut notices: ResMut<Notices>,
+) {
+    let ours = |press: &&Press| {
+        let stepping = matches!(press.tap, Tap::NextStep | Tap::PreviousStep | Tap::Order);
+        stepping || matches!(press.tap, Tap::Pin | Tap::Click | Tap::Boxes | Tap::LevelUp | Tap::LevelDown)
+    };
+    for press in input.taps.iter().filter(ours) {
+        let levels = debug.statistics.as_ref().map_or(u32::MAX, |statistics| statistics.levels);
+        if let Some(text) = debug.press(press, &viewpoint, settings.size, levels) {
+            notices.0.push(Notice::Text(text.to_owned()));
+        }
+    }
+    if debug.is_changed() {
+        depth_wanted.set_if_neq(DepthWanted(debug.pinned.is_some() || debug.boxes != Boxes::Off));
+    }
+}
+
+/// Explains the pinned pixel, and counts the hierarchy, whenever they may have changed.
+#[expect(clippy::too_many_arguments, reason = "the whole scene")]
+pub fn explain_pinned(
+    geometry: Res<Geometry>,
+    surfaces: Res<Surfaces>,
+    coverage: Res<Coverage>,
+    lights: Res<Lights>,
+    settings: Res<RenderSettings>,
+    film: Res<Film>,
+    bounds: Option<Res<SceneBounds>>,
+    mut debug: ResMut<Debug>,
+    mut lines: ResMut<DebugLines>,
+) {
+    let scene_changed =
+        geometry.is_changed() || surfaces.is_changed() || lights.is_changed() || settings.is_changed();
+    if !(debug.is_changed() || scene_changed) {
+        return;
+    }
+    let debug = debug.bypass_change_detection();
+    let mut drawn = Vec::new();
+    debug.statistics = None;
+    if debug.boxes != Boxes::Off {
+        let (boxes, statistics) = boxes::show(&geometry.tlas, debug.boxes);
+        drawn.extend(boxes);
+        debug.statistics = Some(Arc::new(statistics));
+    }
+    debug.told =
+        debug.pinned.filter(|(pixel, _)| pixel.cmplt(settings.size).all()).map(|(pixel, viewpoint)| {
+            let scene = TraceScene {
+                geometry: &geometry,
+                surfaces: &surfaces,
+                coverage: &coverage,
+                lights: &lights,
+                viewpoint: &viewpoint,
+                settings: &settings,
+            };
+            let far = bounds.map_or(10.0, |bounds| 2.0 * bounds.radius as f32);
+            let first = film.first_sample();
+            let explanation = explain(&scene, pixel, first..first.saturating_add(SAMPLES), far);
+            Arc::new(tell(&geometry.tlas, explanation))
+        });
+    if let Some(told) = &debug.told {
+        drawn.extend(ray_lines(&told.explanation));
+        let steps = &told.steps[debug.order as usize];
+        debug.step = debug.step.min(steps.len());
+        drawn.extend(step_lines(&geometry.tlas, &steps[..debug.step]));
+    }
+    lines.0 = drawn;
+}
+
+fn tell(tlas: &Tlas, explanation: Explanation) -> Told {
+    let mut told = Told { explanation, ..Told::default() };
+    if let Some(ray) = told.explanation.ray {
+        for order in [Order::NearFirst, Order::Queue] {
+            let (hit, visits) =
+                tlas.inspect(&ray, order, false, |step| told.steps[order as usize].push(*step));
+            (told.hit, told.visits[order as usize]) = (hit, visits);
+        }
+    }
+    told
+}
+
+/// Lines in the scene, in render space.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct DebugLines(pub Vec<Line>);
+
+/// What colour a ray has.
+#[must_use]
+pub fn color_of(kind: Kind) -> [u8; 3] {
+    match kind {
+        Kind::Camera => [255, 255, 255],
+        Kind::Specular => [104, 208, 232],
+        Kind::Bounce => [150, 160, 180],
+        Kind::Lit => [90, 235, 100],
+        Kind::Shadow => [190, 100, 255],
+        Kind::Blocked => [255, 70, 60],
+    }
+}
+
+fn ray_lines(explanation: &Explanation) -> impl Iterator<Item = Line> {
+    explanation.segments.iter().map(|segment| {
+        let alpha = if segment.kind == Kind::Camera { 0.25 } else { 0.7 };
+        Line { ends: [segment.from, segment.to], color: color_of(segment.kind), alpha }
+    })
+}
+
+/// Boxes visited, the last one brightest.
+fn step_lines(tlas: &Tlas, steps: &[Step]) -> Vec<Line> {
+    let count = steps.len();
+    let line = |(i, step): (usize, &Step)| {
+        let placement = step.instance.and_then(|i| tlas.placements().get(i as usize));
+        let is_last = i + 1 == count;
+        let color = match step.visited {
+            _ if is_last => [255, 255, 120],
+            Visited::Node => [110, 150, 255],
+            Visited::Instance => [255, 150, 230],
+            Visited::Leaf => [140, 230, 120],
+        };
+        let placed = Placed { bounds: step.bounds, placement };
+        placed.lines(color, if is_last { 1.0 } else { 0.3 }).collect::<Vec<_>>()
+    };
+    steps.iter().enumerate().flat_map(line).collect()
+}
+
+/// Draws the lines as the camera sees them now.
+pub fn draw_layer(
+    lines: Res<DebugLines>,
+    viewpoint: Res<Viewpoint>,
+    settings: Res<RenderSettings>,
+    first: Res<FirstHits>,
+    redone: Res<Redone>,
+    mut drawn: Local<u64>,
+    mut layer: ResMut<CurrentLayer>,
+) {
+    let is_new = lines.is_changed() || first.is_changed() || *drawn != redone.resets;
+    if !is_new || lines.0.is_empty() && layer.0.is_none() {
+        return;
+    }
+    *drawn = redone.resets;
+    if lines.0.is_empty() {
+        layer.0 = None;
+        return;
+    }
+    let size = settings.size.max(UVec2::ONE);
+    let surfaces = first.surfaces.as_ref().filter(|grid| grid.size() == size && grid.is_covered());
+    let mut made = Layer::new(size);
+    made.draw(&lines.0, &viewpoint, surfaces.map(crate::trace::first::Grid::cells));
+    layer.0 = Some(Arc::new(made));
+}

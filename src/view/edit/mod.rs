@@ -1,0 +1,464 @@
+//! Changing the scene while it is seen: pick a thing, change its numbers, take it back, keep it in a file.
+
+pub mod property;
+pub mod save;
+
+use super::controls::{Notice, Notices};
+use super::input::Input;
+use super::keymap::Tap;
+use super::orbit::ray_through;
+use crate::app::FrameStats;
+use crate::bvh::Ray;
+use crate::load::settings::edit::duplicate;
+use crate::scene::path::path_of;
+use crate::scene::{Hidden, Light, Material, SceneBounds, Transform};
+use crate::sync::{Entities, Redone};
+use crate::trace::{Geometry, Lights, RenderSettings, Viewpoint};
+use bevy_ecs::prelude::*;
+use glam::DVec2;
+use property::{Property, Row, material_of, rows, set};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What is selected, and what was done.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Editor {
+    selected: Option<Selection>,
+    /// Which of its rows the keys change.
+    row: usize,
+    undo: Vec<Undo>,
+    /// What was changed: entity and material slot. In this order.
+    edited: Vec<(Entity, usize)>,
+    /// Copies, and what they are of.
+    copies: Vec<(Entity, Entity)>,
+    shown: Option<Arc<EditStatus>>,
+    before: Redone,
+    /// Seconds of bringing the arrays up to date, in the frame of the last edit.
+    sync: Duration,
+    sync_began: Option<Instant>,
+    /// Samples per pixel that the last edit made worthless.
+    lost: f64,
+    dirty: bool,
+    redone: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Selection {
+    entity: Entity,
+    slot: usize,
+}
+
+/// How things were.
+#[derive(Clone, Debug)]
+struct Undo {
+    selection: Selection,
+    /// Changes of one number in a row are one step.
+    property: Option<Property>,
+    transform: Option<Transform>,
+    light: Option<Light>,
+    material: Option<(Entity, Material)>,
+    hidden: bool,
+}
+
+/// What the card shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EditStatus {
+    /// Its name.
+    pub name: String,
+    /// Its numbers.
+    pub rows: Vec<Row>,
+    /// Which one the keys change.
+    pub row: usize,
+    /// Whether it is left out.
+    pub hidden: bool,
+    /// What the last edit made necessary, and how long it took.
+    pub redone: String,
+}
+
+impl Editor {
+    /// For the card.
+    #[must_use]
+    pub fn status(&self) -> Option<Arc<EditStatus>> {
+        self.shown.clone()
+    }
+
+    /// What was changed, in the order in which it was first.
+    #[must_use]
+    pub fn edited(&self) -> (&[(Entity, usize)], &[(Entity, Entity)]) {
+        (&self.edited, &self.copies)
+    }
+
+    fn note(&mut self, selection: Selection) {
+        let Selection { entity, slot } = selection;
+        if !self.edited.contains(&(entity, slot)) {
+            self.edited.push((entity, slot));
+        }
+    }
+}
+
+/// Acts on keys and on the card.
+pub fn edit_scene(world: &mut World) {
+    let input = world.resource::<Input>();
+    let presses: Vec<_> = input.taps.iter().filter(|press| press.tap.edits()).copied().collect();
+    let values = input.edits.clone();
+    if presses.is_empty() && values.is_empty() {
+        return;
+    }
+    // Whoever else is at work in this frame shall not see the editor gone.
+    let Some(mut editor) = world.remove_resource::<Editor>() else { return };
+    for press in presses {
+        let steps = if press.shift { 10.0 } else { 1.0 };
+        match press.tap {
+            Tap::Select => select(world, &mut editor, press.cursor),
+            Tap::Escape => editor.selected = None,
+            Tap::PreviousRow => editor.row = editor.row.saturating_sub(1),
+            Tap::NextRow => editor.row += 1,
+            Tap::Less => step(world, &mut editor, -steps),
+            Tap::More => step(world, &mut editor, steps),
+            Tap::Hide => hide(world, &mut editor),
+            Tap::Duplicate => copy(world, &mut editor),
+            Tap::Undo => undo(world, &mut editor),
+            Tap::SaveEdits => {
+                let said = save::save(world, &editor);
+                world.resource_mut::<Notices>().0.push(said);
+            }
+            _ => {}
+        }
+    }
+    for (property, value) in values {
+        change(world, &mut editor, property, value);
+    }
+    editor.dirty = true;
+    world.insert_resource(editor);
+}
+
+fn radius(world: &World) -> f64 {
+    world.get_resource::<SceneBounds>().map_or(1.0, |bounds| bounds.radius)
+}
+
+fn say(world: &mut World, text: &str) {
+    world.resource_mut::<Notices>().0.push(Notice::Text(text.to_owned()));
+}
+
+fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
+    let found = pick(world, cursor);
+    editor.row = 0;
+    editor.selected = if editor.selected == found { None } else { found };
+    if found.is_none() {
+        say(world, "nothing there to edit");
+    }
+}
+
+fn pick(world: &World, cursor: DVec2) -> Option<Selection> {
+    let geometry = world.resource::<Geometry>();
+    let ray = ray_through(world.resource::<Viewpoint>(), world.resource::<RenderSettings>(), cursor);
+    let hit = geometry.tlas.closest_hit(&ray);
+    let entities = world.resource::<Entities>();
+    let t_max = hit.map_or(f32::INFINITY, |hit| hit.t);
+    if let Some(lamp) = world.resource::<Lights>().closest(&Ray { t_max, ..ray }) {
+        let entity = *entities.lights.get(lamp.light as usize)?;
+        return Some(Selection { entity, slot: 0 });
+    }
+    let hit = hit?;
+    let slot = geometry.instances[hit.instance as usize].mesh.slot(hit.triangle as usize);
+    Some(Selection { entity: *entities.instances.get(hit.instance as usize)?, slot })
+}
+
+/// Remembers how it is now.
+fn remember(world: &World, editor: &mut Editor, selection: Selection, property: Option<Property>) {
+    let last = editor.undo.last();
+    if property.is_some() && last.is_some_and(|u| (u.selection, u.property) == (selection, property)) {
+        return;
+    }
+    let Selection { entity, slot } = selection;
+    let material = material_of(world, entity, slot);
+    editor.undo.push(Undo {
+        selection,
+        property,
+        transform: world.get::<Transform>(entity).copied(),
+        light: world.get::<Light>(entity).cloned(),
+        material: material.and_then(|m| Some((m, world.get::<Material>(m)?.clone()))),
+        hidden: world.get::<Hidden>(entity).is_some(),
+    });
+}
+
+fn change(world: &mut World, editor: &mut Editor, property: Property, value: f64) {
+    let Some(selection) = editor.selected else { return };
+    remember(world, editor, selection, Some(property));
+    set(world, selection.entity, selection.slot, property, value);
+    editor.note(selection);
+}
+
+fn step(world: &mut World, editor: &mut Editor, steps: f64) {
+    let Some(Selection { entity, slot }) = editor.selected else {
+        return say(world, "select something first: M");
+    };
+    let rows = rows(world, entity, slot, radius(world));
+    if let Some(row) = rows.get(editor.row.min(rows.len().saturating_sub(1))) {
+        change(world, editor, row.property, row.stepped(steps));
+    }
+}
+
+fn hide(world: &mut World, editor: &mut Editor) {
+    let Some(selection) = editor.selected else { return };
+    remember(world, editor, selection, None);
+    let mut entity = world.entity_mut(selection.entity);
+    if entity.contains::<Hidden>() {
+        entity.remove::<Hidden>();
+    } else {
+        entity.insert(Hidden);
+    }
+    editor.note(selection);
+}
+
+fn copy(world: &mut World, editor: &mut Editor) {
+    let Some(selection) = editor.selected else { return };
+    let path = path_of(world, selection.entity);
+    let name = format!("{} copy {}", path.last().map_or("", String::as_str), editor.copies.len() + 1);
+    let copy = duplicate(world, selection.entity, &name);
+    crate::app::propagate(world);
+    editor.copies.push((copy, selection.entity));
+    let copied = Selection { entity: copy, slot: selection.slot };
+    // To undo it is to hide it: what it was then is not there.
+    editor.undo.push(Undo {
+        selection: copied,
+        property: None,
+        transform: None,
+        light: None,
+        material: None,
+        hidden: true,
+    });
+    editor.selected = Some(copied);
+    // Beside the original, not in it.
+    let aside = rows(world, copy, 0, radius(world)).first().map(|row| row.stepped(5.0));
+    if let Some(x) = aside {
+        set(world, copy, copied.slot, Property::Position(0), x);
+    }
+    editor.note(copied);
+}
+
+fn undo(world: &mut World, editor: &mut Editor) {
+    let Some(last) = editor.undo.pop() else { return say(world, "nothing to undo") };
+    let entity = last.selection.entity;
+    if let Some(transform) = last.transform
+        && let Some(mut now) = world.get_mut::<Transform>(entity)
+    {
+        now.set_if_neq(transform);
+    }
+    if let Some(light) = last.light
+        && let Some(mut now) = world.get_mut::<Light>(entity)
+    {
+        now.set_if_neq(light);
+    }
+    if let Some((material, value)) = last.material
+        && let Some(mut now) = world.get_mut::<Material>(material)
+    {
+        now.set_if_neq(value);
+    }
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        match (last.hidden, entity.contains::<Hidden>()) {
+            (true, false) => drop(entity.insert(Hidden)),
+            (false, true) => drop(entity.remove::<Hidden>()),
+            _ => {}
+        }
+    }
+    crate::app::propagate(world);
+    editor.selected = Some(last.selection);
+}
+
+/// Before the arrays are brought up to date.
+pub fn start_sync(mut editor: ResMut<Editor>, redone: Res<Redone>, stats: Res<FrameStats>) {
+    let editor = editor.bypass_change_detection();
+    if editor.dirty {
+        (editor.before, editor.lost) = (*redone, stats.samples_per_pixel);
+        editor.sync_began = Some(Instant::now());
+    }
+}
+
+/// After it: what was it that had to be done?
+pub fn finish_sync(world: &mut World) {
+    if !world.resource::<Editor>().dirty {
+        return;
+    }
+    let Some(mut editor) = world.remove_resource::<Editor>() else { return };
+    editor.dirty = false;
+    editor.sync = editor.sync_began.take().map_or(Duration::ZERO, |began| began.elapsed());
+    let now = *world.resource::<Redone>();
+    if now != editor.before {
+        editor.redone = told(editor.before, now, editor.sync, editor.lost);
+    }
+    editor.shown = editor.selected.map(|Selection { entity, slot }| {
+        let rows = rows(world, entity, slot, radius(world));
+        editor.row = editor.row.min(rows.len().saturating_sub(1));
+        Arc::new(EditStatus {
+            name: path_of(world, entity).join(" / "),
+            rows,
+            row: editor.row,
+            hidden: world.get::<Hidden>(entity).is_some(),
+            redone: editor.redone.clone(),
+        })
+    });
+    world.insert_resource(editor);
+}
+
+fn told(before: Redone, now: Redone, time: Duration, lost: f64) -> String {
+    let mut parts = Vec::new();
+    for (name, before, now) in [
+        ("meshes", before.blas, now.blas),
+        ("top level", before.tlas, now.tlas),
+        ("materials", before.surfaces, now.surfaces),
+        ("lights", before.lights, now.lights),
+    ] {
+        if now > before {
+            parts.push(name);
+        }
+    }
+    let what = if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") };
+    format!("redone: {what}, in {:.1} ms; {lost:.0} samples per pixel lost", time.as_secs_f64() * 1e3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::input::Press;
+    use super::*;
+    use crate::app::{App, FrameBudget, FrameSystems};
+    use crate::farm::Identity;
+    use crate::load::{LoadOptions, SceneSource};
+    use crate::open::{Wishes, open};
+    use crate::trace::Film;
+    use glam::UVec2;
+    use std::path::PathBuf;
+
+    fn opened(scene: &str, settings: Option<PathBuf>) -> App {
+        let options = LoadOptions { scene_settings: settings, ..LoadOptions::default() };
+        let wishes = Wishes { size: Some(UVec2::new(64, 36)), samples: Some(2), ..Wishes::default() };
+        open(&SceneSource::parse(scene).unwrap(), &options, &wishes).unwrap().app
+    }
+
+    fn editable(scene: &str) -> App {
+        let mut app = opened(scene, None);
+        app.world.init_resource::<Editor>();
+        app.world.init_resource::<Notices>();
+        app.world.insert_resource(Input::new(Instant::now()));
+        app.add_systems(edit_scene.in_set(FrameSystems::Input));
+        app.add_systems(start_sync.in_set(FrameSystems::Sync).before(crate::sync::build_blas));
+        app.add_systems(finish_sync.in_set(FrameSystems::Sync).after(crate::sync::reset_film));
+        app
+    }
+
+    fn press(app: &mut App, tap: Tap, cursor: [f64; 2]) {
+        app.world.resource_mut::<Input>().taps.push(Press { cursor: cursor.into(), ..Press::from(tap) });
+        app.frame();
+        app.world.resource_mut::<Input>().end_frame();
+    }
+
+    fn status(app: &App) -> Arc<EditStatus> {
+        app.world.resource::<Editor>().status().expect("something is selected")
+    }
+
+    /// Selects, even what is selected already.
+    fn choose(app: &mut App, place: [f64; 2]) {
+        press(app, Tap::Escape, place);
+        press(app, Tap::Select, place);
+    }
+
+    /// Selects what is at `place` and steps each of its numbers up once.
+    fn change_all(app: &mut App, place: [f64; 2]) {
+        choose(app, place);
+        for _ in 0..status(app).rows.len() {
+            press(app, Tap::More, place);
+            press(app, Tap::NextRow, place);
+        }
+    }
+
+    fn picture(app: &mut App) -> Film {
+        app.world.resource_mut::<FrameBudget>().sample_target = 2;
+        app.frame();
+        app.frame();
+        app.world.resource::<Film>().clone()
+    }
+
+    const PLACES: [[f64; 2]; 4] = [[0.5, 0.8], [0.5, 0.14], [0.4, 0.6], [0.05, 0.62]];
+
+    #[test]
+    fn a_saved_scene_is_the_edited_one_to_the_bit() {
+        for scene in ["cornell", "gallery", "bust"] {
+            let mut app = editable(scene);
+            let before = Identity::of(&app.world, scene.to_owned());
+            for place in PLACES {
+                if pick(&app.world, place.into()).is_some() {
+                    change_all(&mut app, place);
+                }
+            }
+            press(&mut app, Tap::Duplicate, [0.5; 2]);
+            press(&mut app, Tap::More, [0.5; 2]);
+            choose(&mut app, PLACES[1]);
+            press(&mut app, Tap::Hide, PLACES[1]);
+            let editor = app.world.resource::<Editor>().clone();
+            let (text, _) = save::text(&app.world, &editor).unwrap();
+            let file = std::env::temp_dir().join(format!("penumbra-{scene}-{}.toml", std::process::id()));
+            std::fs::write(&file, &text).unwrap();
+            let mut again = opened(scene, Some(file.clone()));
+            std::fs::remove_file(&file).unwrap();
+            let (edited, loaded) =
+                (Identity::of(&app.world, scene.into()), Identity::of(&again.world, scene.into()));
+            assert_ne!(edited.scene_hash, before.scene_hash);
+            assert_eq!(edited.differences(&loaded), Vec::<String>::new(), "{scene}\n{text}");
+            assert_eq!(picture(&mut app), picture(&mut again), "{scene}");
+        }
+    }
+
+    #[test]
+    fn undo_brings_everything_back_to_the_bit() {
+        let mut app = editable("cornell");
+        let before = Identity::of(&app.world, String::new());
+        for place in PLACES {
+            if pick(&app.world, place.into()).is_some() {
+                change_all(&mut app, place);
+            }
+        }
+        press(&mut app, Tap::Duplicate, PLACES[0]);
+        press(&mut app, Tap::Hide, PLACES[0]);
+        press(&mut app, Tap::Hide, PLACES[0]);
+        assert_ne!(Identity::of(&app.world, String::new()).scene_hash, before.scene_hash);
+        for _ in 0..app.world.resource::<Editor>().undo.len() {
+            press(&mut app, Tap::Undo, PLACES[0]);
+        }
+        assert_eq!(Identity::of(&app.world, String::new()).differences(&before), Vec::<String>::new());
+        press(&mut app, Tap::Undo, PLACES[0]);
+        let said = app.world.resource::<Notices>().0.last().cloned();
+        assert_eq!(said, Some(Notice::Text("nothing to undo".to_owned())));
+    }
+
+    #[test]
+    fn only_what_must_be_is_redone_and_it_is_told() {
+        let mut app = editable("cornell");
+        choose(&mut app, PLACES[1]);
+        let rows = status(&app).rows.clone();
+        let mut edit = |property: Property| {
+            let before = *app.world.resource::<Redone>();
+            let row = rows.iter().find(|row| row.property == property).unwrap();
+            app.world.resource_mut::<Input>().edits.push((property, row.stepped(1.0)));
+            app.frame();
+            app.world.resource_mut::<Input>().end_frame();
+            let now = *app.world.resource::<Redone>();
+            (
+                now.blas - before.blas,
+                now.tlas - before.tlas,
+                now.lights - before.lights,
+                status(&app).redone.clone(),
+            )
+        };
+        let (blas, tlas, lights, told) = edit(Property::Power);
+        assert_eq!((blas, tlas, lights), (0, 0, 1));
+        assert!(told.starts_with("redone: lights, in "), "{told}");
+        choose(&mut app, PLACES[0]);
+        let position = status(&app).rows[0].clone();
+        let before = *app.world.resource::<Redone>();
+        app.world.resource_mut::<Input>().edits.push((position.property, position.stepped(1.0)));
+        app.frame();
+        let now = *app.world.resource::<Redone>();
+        assert_eq!((now.blas, now.tlas), (before.blas, before.tlas + 1));
+        assert!(status(&app).redone.starts_with("redone: top level, lights, in "), "{}", status(&app).redone);
+    }
+}

@@ -1,0 +1,348 @@
+//! Everything about a thing that can be edited, as numbers with names.
+
+use crate::load::settings::edit::{set_sizes, sizes, spectra};
+use crate::scene::color::luminance;
+use crate::scene::{GlobalTransform, Glossy, Instance, Light, Material, Transform};
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot, Vec3};
+
+/// One number of a thing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Property {
+    /// Along a world axis, scene units.
+    Position(usize),
+    /// About a world axis (the one after the other: x, y, z), degrees.
+    Turn(usize),
+    /// Factor in all directions.
+    Scale,
+    /// A channel of the light's spectra, relative to the strongest.
+    LightColor(usize),
+    /// Mean luminance of its spectra.
+    Power,
+    /// See [`sizes`]; angles in degrees.
+    Size(usize),
+    /// A channel of the base colour, 0 to 1.
+    BaseColor(usize),
+    /// Of GGX, 0 to 1.
+    Roughness,
+    /// Of GGX, 0 to 1.
+    Metallic,
+    /// Of Blinn-Phong, grey, 0 to 1.
+    Specular,
+    /// Of Blinn-Phong.
+    Exponent,
+    /// Grey, 0 to 1.
+    Mirror,
+    /// Luminance that it emits.
+    Emission,
+}
+
+/// A property and its value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Which.
+    pub property: Property,
+    /// What it is called.
+    pub label: &'static str,
+    /// How much it is.
+    pub value: f64,
+    /// What a press of a key or a point of the mouse adds; or, for `grows`, the part by which it grows.
+    pub step: f64,
+    /// Whether steps are factors.
+    pub grows: bool,
+    /// What it may be.
+    pub range: [f64; 2],
+}
+
+impl Row {
+    /// The value after `steps` presses.
+    #[must_use]
+    pub fn stepped(&self, steps: f64) -> f64 {
+        let [low, high] = self.range;
+        let next = if self.grows {
+            self.value * (1.0 + self.step).powf(steps)
+        } else {
+            self.value + self.step * steps
+        };
+        // Nothing grows from nothing.
+        let next = if self.grows && self.value == 0.0 && steps > 0.0 { self.step } else { next };
+        next.clamp(low, high)
+    }
+}
+
+const AXES: [[&str; 3]; 3] = [["x", "y", "z"], ["turn x", "turn y", "turn z"], ["red", "green", "blue"]];
+const ANY: [f64; 2] = [-1e15, 1e15];
+const UNIT: [f64; 2] = [0.0, 1.0];
+const POSITIVE: [f64; 2] = [1e-9, 1e12];
+
+/// All that can be edited of `entity`, whose material number `slot` was meant. `radius` is that of the scene.
+#[must_use]
+pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let mut add = |property, label, value: f64, step: f64, grows: bool, range: [f64; 2]| {
+        // Adding 0 turns −0 into 0.
+        rows.push(Row { property, label, value: value + 0.0, step, grows, range });
+    };
+    let light = world.get::<Light>(entity);
+    let has_place = !matches!(light, Some(Light::Environment { .. }));
+    if let Some(place) = world.get::<GlobalTransform>(entity).filter(|_| has_place) {
+        let (scale, rotation, translation) = parts(&place.0);
+        for axis in 0..3 {
+            add(Property::Position(axis), AXES[0][axis], translation[axis], radius / 50.0, false, ANY);
+        }
+        for axis in 0..3 {
+            add(Property::Turn(axis), AXES[1][axis], rotation[axis].to_degrees(), 5.0, false, ANY);
+        }
+        if light.is_none() {
+            add(Property::Scale, "scale", scale.abs().max_element(), 0.05, true, POSITIVE);
+        }
+    }
+    if let Some(light) = light {
+        let mut copy = light.clone();
+        let all: Vec<Vec3> = spectra(&mut copy).into_iter().map(|s| *s).collect();
+        let mean = all.iter().sum::<Vec3>() / all.len().max(1) as f32;
+        add(Property::Power, "power", f64::from(luminance(mean)), 0.1, true, [0.0, 1e12]);
+        let most = f64::from(mean.max_element()).max(1e-30);
+        for (channel, label) in AXES[2].into_iter().enumerate() {
+            let share = f64::from(mean[channel]) / most;
+            add(Property::LightColor(channel), label, share, 0.05, false, UNIT);
+        }
+        for (i, size) in sizes(light).into_iter().enumerate() {
+            let (label, degrees) = size_label(light, i);
+            let value = if degrees { f64::from(size).to_degrees() } else { f64::from(size) };
+            let range = if degrees { [0.0, 180.0] } else { POSITIVE };
+            add(Property::Size(i), label, value, if degrees { 1.0 } else { 0.1 }, !degrees, range);
+        }
+    }
+    if let Some(material) = material_of(world, entity, slot).and_then(|m| world.get::<Material>(m)) {
+        for (channel, label) in AXES[2].into_iter().enumerate() {
+            let value = f64::from(material.base_color[channel]);
+            add(Property::BaseColor(channel), label, value, 0.05, false, UNIT);
+        }
+        match material.glossy {
+            Glossy::None => {}
+            Glossy::Ggx { metallic, roughness, .. } => {
+                add(Property::Roughness, "roughness", f64::from(roughness), 0.05, false, UNIT);
+                add(Property::Metallic, "metallic", f64::from(metallic), 0.1, false, UNIT);
+            }
+            Glossy::BlinnPhong { specular, exponent } => {
+                add(Property::Specular, "specular", f64::from(specular.max_element()), 0.05, false, UNIT);
+                add(Property::Exponent, "exponent", f64::from(exponent), 0.2, true, [0.0, 1e6]);
+            }
+        }
+        add(Property::Mirror, "mirror", f64::from(material.mirror.max_element()), 0.05, false, UNIT);
+        add(Property::Emission, "emits", f64::from(luminance(material.emission)), 0.2, true, [0.0, 1e12]);
+    }
+    rows
+}
+
+fn size_label(light: &Light, i: usize) -> (&'static str, bool) {
+    match light {
+        Light::Spot { .. } => (["inner angle", "outer angle"][i % 2], true),
+        Light::Directional { .. } => ("angle", true),
+        Light::Segment { .. } => ("half length", false),
+        Light::Parallelogram { .. } => (["edge u", "edge v"][i % 2], false),
+        _ => ("radius", false),
+    }
+}
+
+/// The material that `slot` of an instance wears.
+#[must_use]
+pub fn material_of(world: &World, entity: Entity, slot: usize) -> Option<Entity> {
+    world.get::<Instance>(entity)?.materials.get(slot).copied()
+}
+
+/// Scale along the local axes, rotation about x, then y, then z in radians, and place.
+fn parts(place: &DAffine3) -> (DVec3, DVec3, DVec3) {
+    let (scale, rotation, translation) = place.to_scale_rotation_translation();
+    let (z, y, x) = rotation.to_euler(EulerRot::ZYX);
+    (scale, DVec3::new(x, y, z), translation)
+}
+
+/// Gives `property` of `entity` the value. What the thing does not have stays.
+pub fn set(world: &mut World, entity: Entity, slot: usize, property: Property, value: f64) {
+    match property {
+        Property::Position(_) | Property::Turn(_) | Property::Scale => place(world, entity, property, value),
+        Property::LightColor(_) | Property::Power | Property::Size(_) => {
+            if let Some(mut light) = world.get_mut::<Light>(entity) {
+                set_light(&mut light, property, value as f32);
+            }
+        }
+        _ => {
+            let material = material_of(world, entity, slot);
+            if let Some(mut material) = material.and_then(|m| world.get_mut::<Material>(m)) {
+                set_material(&mut material, property, value as f32);
+            }
+        }
+    }
+}
+
+/// Moves it in the world; what it hangs on stays.
+fn place(world: &mut World, entity: Entity, property: Property, value: f64) {
+    let Some(global) = world.get::<GlobalTransform>(entity).map(|global| global.0) else { return };
+    let (scale, turn, translation) = parts(&global);
+    let mut moved = global;
+    match property {
+        Property::Position(axis) => {
+            let mut to = translation;
+            to[axis] = value;
+            moved.translation = to;
+        }
+        Property::Turn(axis) => {
+            let rotation =
+                |turn: DVec3| DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x));
+            let mut to = turn;
+            to[axis] = value.to_radians();
+            moved.matrix3 = rotation(to) * rotation(turn).inverse() * global.matrix3;
+        }
+        _ => moved.matrix3 *= value / scale.abs().max_element(),
+    }
+    let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
+    let world_from_parent = parent.and_then(|p| world.get::<GlobalTransform>(p)).map(|g| g.0);
+    let local = world_from_parent.map_or(moved, |parent| parent.inverse() * moved);
+    if local.is_finite()
+        && let Some(mut transform) = world.get_mut::<Transform>(entity)
+    {
+        transform.set_if_neq(Transform(local));
+    }
+    // The next edit of the same frame starts from here.
+    crate::app::propagate(world);
+}
+
+fn set_light(light: &mut Light, property: Property, value: f32) {
+    let mean = |light: &mut Light| {
+        let all = spectra(light);
+        let count = all.len().max(1) as f32;
+        all.into_iter().map(|s| *s).sum::<Vec3>() / count
+    };
+    match property {
+        Property::Power => {
+            let old = luminance(mean(light));
+            for spectrum in spectra(light) {
+                *spectrum = if old > 0.0 { *spectrum * (value / old) } else { Vec3::splat(value) };
+            }
+        }
+        Property::LightColor(channel) => {
+            let old = mean(light);
+            let wanted = value * old.max_element();
+            for spectrum in spectra(light) {
+                let share = if old[channel] > 0.0 { spectrum[channel] / old[channel] } else { 1.0 };
+                spectrum[channel] = wanted * share;
+            }
+        }
+        Property::Size(i) => {
+            let mut wanted = sizes(light);
+            let degrees = size_label(light, i).1;
+            if let Some(size) = wanted.get_mut(i) {
+                *size = if degrees { value.to_radians() } else { value };
+                // One that cannot be stays as it is.
+                set_sizes(light, &wanted);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn set_material(material: &mut Material, property: Property, value: f32) {
+    // A grey mirror or a light of the same colour, however dark it was.
+    let scaled = |color: Vec3, old: f32| if old > 0.0 { color * (value / old) } else { Vec3::splat(value) };
+    match property {
+        Property::BaseColor(channel) => material.base_color[channel] = value,
+        Property::Mirror => material.mirror = scaled(material.mirror, material.mirror.max_element()),
+        Property::Emission => material.emission = scaled(material.emission, luminance(material.emission)),
+        Property::Roughness | Property::Metallic => {
+            if let Glossy::Ggx { metallic, roughness, .. } = &mut material.glossy {
+                *(if property == Property::Roughness { roughness } else { metallic }) = value;
+            }
+        }
+        Property::Specular => {
+            if let Glossy::BlinnPhong { specular, .. } = &mut material.glossy {
+                *specular = scaled(*specular, specular.max_element());
+            }
+        }
+        Property::Exponent => {
+            if let Glossy::BlinnPhong { exponent, .. } = &mut material.glossy {
+                *exponent = value;
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Emission;
+
+    fn world() -> (World, Vec<Entity>) {
+        let mut world = World::new();
+        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.2), exponent: 30.0 };
+        let material = world.spawn(Material { glossy: phong, ..Material::default() }).id();
+        let ggx = Glossy::Ggx { metallic: 0.0, roughness: 0.5, texture: None };
+        let shiny = world.spawn(Material { glossy: ggx, ..Material::default() }).id();
+        let turned = DQuat::from_euler(EulerRot::ZYX, 0.3, 0.2, 0.1);
+        let parent =
+            world.spawn(Transform::from_parts(DVec3::new(1.0, 2.0, 3.0), turned, DVec3::splat(2.0))).id();
+        let instance = |materials| Instance { mesh: parent, materials };
+        let one = Vec3::ONE;
+        let strength = [one, one * 2.0];
+        let lights = [
+            Light::Point { intensity: one },
+            Light::Spot { intensity: one, inner_angle: 0.1, outer_angle: 0.5 },
+            Light::Directional { irradiance: one, angle: 0.1 },
+            Light::Segment { half_length: 1.0, strength, emission: Emission::Sine },
+            Light::Parallelogram { edge_u: Vec3::X, edge_v: Vec3::Y, radiance: [one; 4], two_sided: false },
+            Light::Disk { radius: 1.0, radiance: one, two_sided: false },
+            Light::Sphere { radius: 1.0, radiance: one },
+            Light::Environment { radiance: one },
+        ];
+        let mut all = vec![
+            world.spawn((instance(vec![material]), ChildOf(parent))).id(),
+            world.spawn((instance(vec![shiny]), ChildOf(parent))).id(),
+        ];
+        all.extend(
+            lights.into_iter().map(|light| world.spawn((light, ChildOf(parent))).id()).collect::<Vec<_>>(),
+        );
+        crate::app::propagate(&mut world);
+        (world, all)
+    }
+
+    #[test]
+    fn what_is_set_is_what_it_is_then_and_nothing_else_changes() {
+        let (mut world, all) = world();
+        for entity in all {
+            for row in rows(&world, entity, 0, 1.0) {
+                let before = rows(&world, entity, 0, 1.0);
+                let up = row.stepped(1.0);
+                let wanted = if up == row.value { row.stepped(-1.0) } else { up };
+                assert_ne!(wanted, row.value, "{row:?}");
+                set(&mut world, entity, 0, row.property, wanted);
+                for (old, new) in before.iter().zip(rows(&world, entity, 0, 1.0)) {
+                    let coupled = matches!(
+                        (row.property, new.property),
+                        (Property::LightColor(_), Property::Power | Property::LightColor(_))
+                            | (Property::Power, Property::LightColor(_))
+                    );
+                    let expected = if old.property == row.property { wanted } else { old.value };
+                    let off = (new.value - expected).abs();
+                    assert!(
+                        coupled || off < 1e-5 * expected.abs().max(1.0),
+                        "{row:?}: {new:?}, not {expected}"
+                    );
+                }
+                set(&mut world, entity, 0, row.property, row.value);
+            }
+        }
+    }
+
+    #[test]
+    fn values_stay_where_they_mean_something() {
+        let (world, all) = world();
+        for row in all.iter().flat_map(|&entity| rows(&world, entity, 0, 1.0)) {
+            for steps in [-1e9, -1000.0, 1000.0] {
+                let value = row.stepped(steps);
+                assert!(value >= row.range[0] && value <= row.range[1], "{row:?} {value}");
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The error instrument: how the noise falls, when it will have fallen, and the true error where it is known.
+
+use crate::app::FrameStats;
+use crate::image::compare::LinearImage;
+use crate::sync::Redone;
+use crate::trace::convergence::{Convergence, PowerLaw};
+use crate::trace::noise::relative_error;
+use crate::trace::{Film, RenderSettings, Viewpoint};
+use bevy_ecs::prelude::*;
+use std::sync::Arc;
+
+/// One look at a growing picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Seconds of tracing since its start.
+    pub seconds: f64,
+    /// Samples per pixel.
+    pub samples: f64,
+    /// Estimated relative error.
+    pub noise: f64,
+    /// Half the width of its interval.
+    pub doubt: f64,
+    /// Relative error against the reference, if there is one of this view.
+    pub error: Option<f64>,
+}
+
+/// When the noise will be down to a goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Relative noise.
+    pub goal: f64,
+    /// Seconds of tracing from now on.
+    pub seconds: f64,
+}
+
+/// Error over time of this picture and of one before.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Graph {
+    /// This picture, since it was last begun anew.
+    pub current: Vec<Point>,
+    /// The last picture that was worth keeping.
+    pub previous: Vec<Point>,
+    /// Noise over samples, once it holds.
+    pub law: Option<PowerLaw>,
+    /// The next round noise level, and when it will be reached.
+    pub forecast: Option<Forecast>,
+}
+
+/// A picture to measure the true error by, and what it is of.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// The picture.
+    pub image: LinearImage,
+    truth: Vec<f64>,
+    viewpoint: Option<Viewpoint>,
+}
+
+impl Reference {
+    /// Of the view that the window opens with.
+    #[must_use]
+    pub fn new(image: LinearImage) -> Self {
+        Self { truth: image.luminances(), image, viewpoint: None }
+    }
+
+    /// Relative error of `film`, if it is of the same view and size.
+    fn error(&mut self, film: &Film, viewpoint: &Viewpoint) -> Option<f64> {
+        let same_view = self.viewpoint.get_or_insert(*viewpoint) == viewpoint;
+        (same_view && film.size() == self.image.size)
+            .then(|| relative_error(&LinearImage::of(film).luminances(), &self.truth, film.size()))
+            .flatten()
+    }
+}
+
+/// What the instrument remembers.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Instrument {
+    /// What it shows.
+    pub graph: Arc<Graph>,
+    /// The truth, if somebody knows it.
+    pub reference: Option<Reference>,
+    convergence: Convergence,
+    resets: u64,
+    start_seconds: f64,
+    noted: u32,
+}
+
+impl Instrument {
+    /// The same for another world, whose counts begin anew.
+    #[must_use]
+    pub fn moved(self) -> Self {
+        Self { resets: u64::MAX, ..self }
+    }
+
+    /// One that measures the true error, if there is a reference.
+    #[must_use]
+    pub fn against(reference: Option<Reference>) -> Self {
+        Self { reference, ..Self::default() }
+    }
+}
+
+/// Fewer looks than this are no curve to compare with: flying would leave nothing else.
+const WORTH_KEEPING: usize = 4;
+/// Round noise levels that one wants to reach.
+const GOALS: [f64; 9] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001];
+
+/// Notes the noise whenever it has been estimated anew.
+pub fn note_noise(
+    mut instrument: ResMut<Instrument>,
+    stats: Res<FrameStats>,
+    redone: Res<Redone>,
+    film: Res<Film>,
+    viewpoint: Res<Viewpoint>,
+    settings: Res<RenderSettings>,
+) {
+    let instrument = instrument.bypass_change_detection();
+    if instrument.resets != redone.resets {
+        instrument.resets = redone.resets;
+        instrument.start_seconds = stats.trace_seconds;
+        instrument.noted = 0;
+        instrument.convergence = Convergence::default();
+        let graph = Arc::make_mut(&mut instrument.graph);
+        if graph.current.len() >= WORTH_KEEPING {
+            graph.previous = std::mem::take(&mut graph.current);
+        }
+        *graph = Graph { previous: std::mem::take(&mut graph.previous), ..Graph::default() };
+    }
+    let Some(noise) = stats.noise.filter(|_| stats.noise_samples != instrument.noted) else { return };
+    // A picture of the old size is about to go.
+    if film.size() != settings.size {
+        return;
+    }
+    instrument.noted = stats.noise_samples;
+    let seconds = (stats.trace_seconds - instrument.start_seconds).max(1e-6);
+    let samples = stats.samples_per_pixel;
+    let error = instrument.reference.as_mut().and_then(|reference| reference.error(&film, &viewpoint));
+    instrument.convergence.note(f64::from(stats.noise_samples), noise);
+    let law = instrument.convergence.law();
+    let goal = GOALS.into_iter().find(|&goal| goal < noise * 0.95);
+    let forecast = goal.and_then(|goal| {
+        let more = instrument.convergence.samples_to(goal)? - f64::from(stats.noise_samples);
+        Some(Forecast { goal, seconds: more.max(0.0) * seconds / samples })
+    });
+    let graph = Arc::make_mut(&mut instrument.graph);
+    graph.current.push(Point { seconds, samples, noise, doubt: stats.noise_doubt, error });
+    (graph.law, graph.forecast) = (law, forecast);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::convergence::next_look;
+    use glam::UVec2;
+
+    fn world() -> World {
+        let mut world = World::new();
+        world.init_resource::<Instrument>();
+        world.init_resource::<FrameStats>();
+        world.init_resource::<Redone>();
+        world.init_resource::<Viewpoint>();
+        let settings = RenderSettings { size: UVec2::ONE, ..RenderSettings::default() };
+        world.insert_resource(settings);
+        world.insert_resource(Film::new(UVec2::ONE, 0));
+        world
+    }
+
+    /// A picture at 10 samples a second whose noise falls as 0.4 / √n.
+    fn refine(world: &mut World, samples: u32) {
+        let before = world.resource::<FrameStats>().trace_seconds;
+        let mut n = 2;
+        while n <= samples {
+            let mut stats = world.resource_mut::<FrameStats>();
+            stats.noise = Some(0.4 / f64::from(n).sqrt());
+            stats.noise_samples = n;
+            stats.samples_per_pixel = f64::from(n);
+            stats.trace_seconds = before + 0.1 * f64::from(n);
+            world.run_system_cached(note_noise).unwrap();
+            n = next_look(n);
+        }
+    }
+
+    #[test]
+    fn it_foretells_the_seconds_to_the_next_round_level() {
+        let mut world = world();
+        refine(&mut world, 64);
+        let graph = &world.resource::<Instrument>().graph;
+        let forecast = graph.forecast.unwrap();
+        assert_eq!(forecast.goal, 0.02);
+        let last = graph.current.last().unwrap();
+        // 0.4 / √n = 0.02 at n = 400.
+        let wanted = (400.0 - last.samples) * 0.1;
+        assert!((forecast.seconds / wanted - 1.0).abs() < 1e-6, "{forecast:?} {wanted}");
+        assert!((graph.law.unwrap().b - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_previous_curve_is_the_last_one_worth_keeping() {
+        let mut world = world();
+        refine(&mut world, 64);
+        let first = world.resource::<Instrument>().graph.current.clone();
+        // Some steps of flying.
+        for _ in 0..3 {
+            world.resource_mut::<Redone>().resets += 1;
+            refine(&mut world, 2);
+        }
+        assert_eq!(world.resource::<Instrument>().graph.previous, first);
+        refine(&mut world, 32);
+        let second = world.resource::<Instrument>().graph.current.clone();
+        assert!(second[0].seconds < 1.0, "time begins anew: {}", second[0].seconds);
+        world.resource_mut::<Redone>().resets += 1;
+        refine(&mut world, 2);
+        assert_eq!(world.resource::<Instrument>().graph.previous, second);
+    }
+
+    #[test]
+    fn the_true_error_is_told_only_of_the_view_it_is_of() {
+        let mut world = world();
+        let image = LinearImage { size: UVec2::ONE, pixels: vec![glam::Vec3::splat(2.0)] };
+        world.resource_mut::<Instrument>().reference = Some(Reference::new(image));
+        let mut film = Film::new(UVec2::ONE, 0);
+        film.tiles_mut()[0].pixels_mut()[0].add(0, glam::Vec3::splat(2.2));
+        world.insert_resource(film);
+        refine(&mut world, 2);
+        let error = |world: &World| world.resource::<Instrument>().graph.current.last().unwrap().error;
+        assert!((error(&world).unwrap() - 0.1 / 1.01f64.sqrt()).abs() < 1e-6);
+        let moved = glam::DAffine3::from_translation(glam::DVec3::X);
+        let projection = crate::scene::Camera::default().projection;
+        world.insert_resource(Viewpoint::new(&moved, projection));
+        world.resource_mut::<Redone>().resets += 1;
+        refine(&mut world, 2);
+        assert_eq!(error(&world), None);
+    }
+}

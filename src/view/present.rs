@@ -1,0 +1,204 @@
+//! Pictures onto the screen, and what that tells: pictures a second, latency, the title.
+
+use super::ViewError;
+use super::engine::{Wake, lock};
+use super::input::Command;
+use super::keymap::Hold;
+use super::screen::Presented;
+use super::screenshot;
+use super::status::Measured;
+use super::ui::Content;
+use super::window::Viewer;
+use std::time::{Duration, Instant};
+use winit::event_loop::ActiveEventLoop;
+
+/// Between pictures of a view that rests, if presenting takes CPU time from tracing.
+const SOFTWARE_PACE: Duration = Duration::from_millis(80);
+/// Between changes of the title.
+const TITLE_PACE: Duration = Duration::from_millis(500);
+/// Latencies that median and percentile are taken of.
+const LATENCIES: usize = 256;
+
+impl Viewer {
+    /// Takes what the engine has published.
+    pub(super) fn take_published(&mut self) {
+        let Some(engine) = &self.engine else { return };
+        let mut published = lock(&engine.published);
+        if let Some(picture) = published.picture.take() {
+            published.spare = std::mem::replace(&mut self.picture, picture);
+            self.asked = self.asked.or(published.asked.take());
+        }
+        self.moving = published.moving;
+        self.layer.clone_from(&published.layer);
+        self.status.clone_from(&published.status);
+    }
+
+    /// Presents at once, or later if nobody misses it and it costs CPU time.
+    pub(super) fn redraw_in_time(&mut self) {
+        let Some(screen) = &self.screen else { return };
+        let at_rest =
+            screen.software && !self.moving && self.status.as_ref().is_some_and(|s| !s.done && !s.paused);
+        let last = self.presented.back().copied();
+        match last.map(|last| last + SOFTWARE_PACE).filter(|&next| at_rest && next > Instant::now()) {
+            Some(next) => {
+                self.due.redraw.get_or_insert(next);
+            }
+            None => screen.window.request_redraw(),
+        }
+    }
+
+    pub(super) fn redraw(&mut self) {
+        if let Some(screen) = &self.screen {
+            screen.window.request_redraw();
+        }
+    }
+
+    pub(super) fn draw(&mut self, event_loop: &ActiveEventLoop) {
+        self.take_published();
+        self.due.redraw = None;
+        let measured = self.measured();
+        if !self.visible {
+            return;
+        }
+        let Some(screen) = &mut self.screen else {
+            return;
+        };
+        let scale_factor = screen.window.scale_factor();
+        let content = Content {
+            status: self.status.as_ref(),
+            measured,
+            loading: self.status.is_none().then_some(self.options.screenshot_stem.as_str()),
+            notice: &self.notice,
+            keys: &self.options.keys,
+            letters: &self.letters,
+        };
+        let compare = self.held[Hold::Compare as usize];
+        let picture = self.kept.as_ref().filter(|_| compare).unwrap_or(&self.picture);
+        let (ui, layer) = (&mut self.ui, self.layer.as_ref().filter(|_| !compare));
+        let outcome = screen.draw(|bytes, size| {
+            if picture.rgba.is_empty() {
+                bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
+            } else {
+                screenshot::scale_into(&picture.rgba, picture.size, bytes, size);
+            }
+            // After a resize the old layer would lie beside what it is about.
+            if let Some(layer) = layer.as_ref().filter(|layer| layer.size == size && picture.size == size) {
+                layer.cover(bytes);
+            }
+            if !ui.is_bare(&content) {
+                ui.draw(bytes, size, scale_factor, &content);
+            }
+        });
+        let now = Instant::now();
+        for (property, value) in std::mem::take(&mut self.ui.edits) {
+            self.send(Command::Edit { property, value, at: now });
+        }
+        match outcome {
+            Presented::Yes => self.was_presented(now),
+            Presented::Later(pause) => self.due.redraw = Some(now + pause),
+            Presented::Lost(why) => self.fail(event_loop, ViewError::Lost(why)),
+        }
+    }
+
+    pub(super) fn was_presented(&mut self, now: Instant) {
+        self.presented.push_back(now);
+        self.response.pictures += 1;
+        self.longest_pause(now);
+        if let Some(asked) = self.asked.take() {
+            self.latencies.push_back(now - asked);
+            self.response.latencies.push(now - asked);
+            if self.latencies.len() > LATENCIES {
+                self.latencies.pop_front();
+            }
+        }
+        let title = match &self.status {
+            None => format!("{} - loading", self.options.title),
+            Some(s) if s.done => format!("{} - done", self.options.title),
+            Some(s) if s.paused => format!("{} - paused", self.options.title),
+            Some(s) => {
+                format!("{} - {:.0} of {}", self.options.title, s.samples_per_pixel.floor(), s.sample_target)
+            }
+        };
+        let is_final = self.status.as_ref().is_none_or(|s| s.done || s.paused);
+        let long_ago = self.titled_at.is_none_or(|at| now - at > TITLE_PACE);
+        if title != self.title
+            && (is_final || long_ago)
+            && let Some(screen) = &self.screen
+        {
+            screen.window.set_title(&title);
+            self.title = title;
+            self.titled_at = Some(now);
+        }
+    }
+
+    /// While the view changes, pictures are counted by the time between them.
+    fn longest_pause(&mut self, now: Instant) {
+        let before = self.presented.iter().rev().nth(1).copied();
+        if let (true, Some(before)) = (self.moving, before) {
+            self.response.moving_pictures += 1;
+            self.response.moving_time += now - before;
+        }
+    }
+
+    /// Sorted, for the end.
+    pub(super) fn measured_response(&self) -> super::Response {
+        let mut response = self.response.clone();
+        response.latencies.sort_unstable();
+        response
+    }
+
+    pub(super) fn measured(&mut self) -> Measured {
+        let now = Instant::now();
+        while self.presented.front().is_some_and(|&at| now - at > Duration::from_secs(1))
+            && self.presented.len() > 1
+        {
+            self.presented.pop_front();
+        }
+        let pictures_per_second = match (self.presented.front(), self.presented.back()) {
+            (Some(&first), Some(&last)) if last > first => {
+                (self.presented.len() - 1) as f64 / (last - first).as_secs_f64()
+            }
+            _ => 0.0,
+        };
+        let mut sorted: Vec<Duration> = self.latencies.iter().copied().collect();
+        sorted.sort_unstable();
+        let rank =
+            |part: f64| sorted.get(((sorted.len() as f64 * part) as usize).min(sorted.len().max(1) - 1));
+        let latency = rank(0.5).zip(rank(0.99)).map(|(m, w)| (m.as_secs_f64(), w.as_secs_f64()));
+        Measured { pictures_per_second, latency }
+    }
+
+    /// Remembers what is seen now.
+    pub(super) fn keep_picture(&mut self) {
+        self.kept = Some(self.picture.clone());
+        self.say("kept: hold K to see it".to_owned());
+    }
+
+    /// Writes a file on a thread of its own.
+    pub(super) fn save_screenshot(&mut self, with_hud: bool) {
+        let Some(screen) = &self.screen else { return };
+        let size = screen.size();
+        let bytes = if with_hud {
+            screen.bytes().to_vec()
+        } else if self.picture.rgba.is_empty() {
+            return self.say("there is no picture yet".to_owned());
+        } else {
+            self.take_published();
+            let mut bytes = vec![0; size.element_product() as usize * 4];
+            screenshot::scale_into(&self.picture.rgba, self.picture.size, &mut bytes, size);
+            bytes
+        };
+        let stem = self.options.screenshot_stem.clone();
+        let recipe = self.status.as_ref().map_or_else(Default::default, |status| status.recipe.clone());
+        let proxy = self.proxy.clone();
+        let writer = std::thread::spawn(move || {
+            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe) {
+                Ok(path) => format!("saved {}", path.display()),
+                Err(why) => format!("no screenshot: {why}"),
+            };
+            drop(proxy.send_event(Wake::Notice(said)));
+        });
+        self.writers.retain(|writer| !writer.is_finished());
+        self.writers.push(writer);
+    }
+}

@@ -1,0 +1,95 @@
+//! Another scene in the running window, or the same one again from its files.
+
+use super::cameras::Bookmarks;
+use super::controls::Paused;
+use super::edit::Editor;
+use super::edit::save::tables;
+use super::fly::{FlyCamera, FlyCameraState, FlySpeed};
+use super::input::Input;
+use super::instrument::Instrument;
+use super::orbit::Navigation;
+use super::pixel_view::PixelView;
+use crate::app::{App, FrameBudget};
+use crate::image::Display;
+use crate::load::settings::edit::change;
+use crate::load::{LoadOptions, SceneSource};
+use crate::open::{SceneOrigin, Wishes, open};
+use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Transform};
+use crate::sync::BlasCache;
+use crate::trace::{Film, RenderSettings};
+use bevy_ecs::prelude::*;
+use std::path::Path;
+
+/// Loads `path` in place of what `app` shows, with the same settings.
+///
+/// # Errors
+/// Why it cannot be shown; `app` is as it was then.
+pub fn open_other(app: &App, path: &Path) -> Result<App, String> {
+    let source = SceneSource::File(path.to_path_buf());
+    let settings = app.world.resource::<RenderSettings>();
+    let wishes =
+        Wishes { size: Some(settings.size), integrator: Some(settings.integrator), ..Wishes::default() };
+    let mut other = open(&source, &LoadOptions::default(), &wishes).map_err(|error| error.to_string())?.app;
+    let budget = app.world.resource::<FrameBudget>().clone();
+    other.world.insert_resource(budget);
+    other.world.insert_resource(Instrument::default().moved());
+    Ok(other)
+}
+
+/// Loads the scene again and gives it the camera, the edits and all settings of `app`.
+///
+/// # Errors
+/// Why it cannot be shown; `app` is as it was then.
+pub fn load_again(app: &mut App) -> Result<App, String> {
+    let origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
+    let settings = *app.world.resource::<RenderSettings>();
+    let wishes = Wishes { size: Some(settings.size), exposure: Some(0.0), ..Wishes::default() };
+    let mut again = open(&origin.source, &origin.options, &wishes).map_err(|error| error.to_string())?.app;
+    again.world.insert_resource(settings);
+    again.world.insert_resource(Film::new(settings.size, app.world.resource::<Film>().first_sample()));
+    keep::<Display>(app, &mut again);
+    keep::<FrameBudget>(app, &mut again);
+    // Meshes that are the same are not built again.
+    keep::<BlasCache>(app, &mut again);
+    keep::<Bookmarks>(app, &mut again);
+    keep::<Input>(app, &mut again);
+    if let Some(instrument) = app.world.get_resource::<Instrument>() {
+        again.world.insert_resource(instrument.clone().moved());
+    }
+    keep::<Navigation>(app, &mut again);
+    keep::<FlySpeed>(app, &mut again);
+    keep::<Paused>(app, &mut again);
+    keep::<PixelView>(app, &mut again);
+    if let Some(editor) = app.world.get_resource::<Editor>() {
+        for table in tables(&app.world, editor) {
+            // What is not there any more cannot be edited.
+            let _ = change(&mut again.world, &table);
+        }
+    }
+    keep_camera(app, &mut again);
+    Ok(again)
+}
+
+fn keep<T: Resource + Clone>(from: &App, to: &mut App) {
+    if let Some(resource) = from.world.get_resource::<T>() {
+        to.world.insert_resource(resource.clone());
+    }
+}
+
+/// A camera that the user has flown stays where it is; one of the file's is that of the file.
+fn keep_camera(from: &App, to: &mut App) {
+    let active = from.world.resource::<ActiveCamera>().0;
+    if let (Some(fly), Some(state), Some(camera), Some(pose)) = (
+        from.world.get::<FlyCamera>(active),
+        from.world.get::<FlyCameraState>(active),
+        from.world.get::<Camera>(active),
+        from.world.get::<GlobalTransform>(active),
+    ) {
+        let mut entity = to.world.spawn((*fly, *state, *camera, *pose, Transform(pose.0)));
+        if let Some(lens) = from.world.get::<Lens>(active) {
+            entity.insert(*lens);
+        }
+        let entity = entity.id();
+        to.world.insert_resource(ActiveCamera(entity));
+    }
+}

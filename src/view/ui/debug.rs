@@ -1,0 +1,134 @@
+//! Cards about the pinned pixel and the hierarchy.
+
+use super::super::debug::boxes::{Boxes, Statistics};
+use super::super::debug::{DebugStatus, Told, color_of};
+use super::super::status::significant;
+use super::card;
+use super::style::{ACCENT, FAINT, MARGIN};
+use crate::bvh::inspect::{Order, Visited, Visits};
+use crate::trace::explain::{Kind, LightRow};
+use egui::{Align2, Color32, Context, Grid, RichText, Ui, vec2};
+
+/// More lines would cover the picture.
+const MOST_ROWS: usize = 9;
+
+/// Shows the cards in the lower left corner.
+pub fn show(context: &Context, status: &DebugStatus) {
+    if status.told.is_none() && status.statistics.is_none() {
+        return;
+    }
+    card(context, "debug", Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN), |ui| {
+        if let Some(statistics) = &status.statistics {
+            show_statistics(ui, status.boxes, statistics);
+        }
+        if let Some(told) = &status.told {
+            show_pixel(ui, told, status);
+        }
+    });
+}
+
+fn faint(ui: &mut Ui, text: impl Into<String>) {
+    ui.label(RichText::new(text).color(FAINT).small());
+}
+
+fn show_statistics(ui: &mut Ui, boxes: Boxes, statistics: &Statistics) {
+    let title = match boxes {
+        Boxes::Off => "hierarchy".to_owned(),
+        Boxes::Level(level) => format!("hierarchy: level {level} of {}", statistics.levels),
+        Boxes::Leaves => "hierarchy: leaves".to_owned(),
+    };
+    ui.label(RichText::new(title).color(ACCENT));
+    let [shown, wanted] = statistics.shown;
+    let boxes = if shown < wanted { format!("{shown} of {wanted} boxes") } else { format!("{shown} boxes") };
+    let text = format!(
+        "{boxes}; {} instances, {} nodes, {} kB, cost {}",
+        statistics.instances,
+        statistics.nodes,
+        statistics.bytes / 1000,
+        significant(f64::from(statistics.cost), 3),
+    );
+    ui.label(RichText::new(text).small());
+    let sizes = statistics.leaves.iter().zip(1..).filter(|(count, _)| **count > 0);
+    let sizes: Vec<String> = sizes.map(|(count, size)| format!("{count} × {size}")).collect();
+    faint(ui, format!("leaves × triangles: {}", sizes.join(", ")));
+}
+
+fn show_pixel(ui: &mut Ui, told: &Told, status: &DebugStatus) {
+    let explanation = &told.explanation;
+    let pixel = explanation.pixel;
+    ui.label(RichText::new(format!("pixel {}, {}", pixel.x, pixel.y)).color(ACCENT));
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 8.0;
+        for (kind, name) in [
+            (Kind::Lit, "brings light"),
+            (Kind::Shadow, "in shadow"),
+            (Kind::Blocked, "area light blocked"),
+            (Kind::Specular, "mirror, glass"),
+        ] {
+            let [r, g, b] = color_of(kind);
+            ui.label(RichText::new(name).color(Color32::from_rgb(r, g, b)).small());
+        }
+    });
+    Grid::new("lights").num_columns(7).spacing([10.0, 2.0]).show(ui, |ui| {
+        for title in ["light", "lit / sampled", "density, 1/sr", "unblocked", "brings", "nodes", "triangles"]
+        {
+            faint(ui, title);
+        }
+        ui.end_row();
+        for row in explanation.lights.iter().take(MOST_ROWS) {
+            show_light(ui, row);
+        }
+    });
+    if explanation.lights.len() > MOST_ROWS {
+        faint(ui, format!("and {} more", explanation.lights.len() - MOST_ROWS));
+    }
+    let [stack, queue] = told.visits;
+    for (name, visits, order) in [("near first", stack, Order::NearFirst), ("queue", queue, Order::Queue)] {
+        let color = if order == status.order { ACCENT } else { FAINT };
+        ui.label(RichText::new(cost_line(name, &visits)).color(color).small());
+    }
+    let steps = &told.steps[status.order as usize];
+    if let Some(step) = status.step.checked_sub(1).and_then(|i| steps.get(i)) {
+        let what = match step.visited {
+            Visited::Node => "node",
+            Visited::Instance => "instance",
+            Visited::Leaf => "leaf",
+        };
+        let found =
+            if step.found.is_finite() { format!(", hit at {:.3}", step.found) } else { String::new() };
+        let (at, of) = (status.step, steps.len());
+        faint(ui, format!("step {at} of {of}: {what}, entered at {:.3}{found}", step.near));
+    } else {
+        faint(ui, format!("{} steps: ; and ' go through them, O changes the order", steps.len()));
+    }
+}
+
+fn cost_line(name: &str, visits: &Visits) -> String {
+    let Visits { nodes, boxes, triangles, waiting } = visits;
+    format!("{name}: {nodes} nodes, {boxes} boxes, {triangles} triangles, {waiting} waiting at most")
+}
+
+fn show_light(ui: &mut Ui, row: &LightRow) {
+    let bounce = if row.depth == 0 { String::new() } else { format!(", bounce {}", row.depth) };
+    let pdf = match row.pdf {
+        None => "—".to_owned(),
+        Some([least, most]) => {
+            let [least, most] = [least, most].map(|pdf| significant(f64::from(pdf), 2));
+            if least == most { least } else { format!("{least} – {most}") }
+        }
+    };
+    let number = |x: f32| significant(f64::from(x), 3);
+    let dark = if row.dark > 0 { format!(" ({} dark)", row.dark) } else { String::new() };
+    for text in [
+        format!("{} {}{bounce}", row.light, row.name),
+        format!("{} / {}{dark}", row.lit, row.samples),
+        pdf,
+        number(row.unblocked),
+        number(row.contribution),
+        format!("{:.1}", row.visits[0]),
+        format!("{:.1}", row.visits[1]),
+    ] {
+        ui.label(RichText::new(text).small());
+    }
+    ui.end_row();
+}

@@ -1,0 +1,197 @@
+//! Error over time, both logarithmic: this picture's curve, the one before, and where it is heading.
+
+use super::super::instrument::{Graph, Point};
+use super::super::status::{duration, percent};
+use super::card;
+use super::style::{ACCENT, FAINT, LINE, MARGIN, TRUTH};
+use crate::trace::convergence::PowerLaw;
+use egui::{
+    Align2, Color32, Context, FontId, Painter, Pos2, Rect, RichText, Sense, Shape, Stroke, pos2, vec2,
+};
+use std::ops::RangeInclusive;
+
+/// The plotted part of the plane.
+struct Axes {
+    rect: Rect,
+    /// Decimal logarithms of seconds.
+    seconds: RangeInclusive<f64>,
+    /// Of relative errors.
+    errors: RangeInclusive<f64>,
+}
+
+/// Shows the graph in the lower right corner.
+pub fn show(context: &Context, graph: &Graph) {
+    let room = context.content_rect().size();
+    let size = vec2(room.x * 0.36, room.y * 0.42).clamp(vec2(150.0, 100.0), vec2(420.0, 280.0));
+    card(context, "graph", Align2::RIGHT_BOTTOM, vec2(-MARGIN, -MARGIN), |ui| {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("noise over time").color(ACCENT).small());
+            if graph.current.iter().any(|point| point.error.is_some()) {
+                ui.label(RichText::new("true error").color(TRUTH).small());
+            }
+            if !graph.previous.is_empty() {
+                ui.label(RichText::new("before").color(FAINT).small());
+            }
+            if let Some(law) = graph.law {
+                ui.label(RichText::new(format!("falls as n^−{:.2}", law.b)).color(FAINT).small());
+            }
+        });
+        let (response, painter) = ui.allocate_painter(size, Sense::hover());
+        let rect = response.rect;
+        let inner = Rect::from_min_max(rect.min + vec2(34.0, 4.0), rect.max - vec2(6.0, 16.0));
+        plot(&painter, Axes::of(graph, inner), graph);
+    });
+}
+
+/// Where a value lies, in decades.
+fn decade(x: f64) -> f64 {
+    x.max(1e-12).log10()
+}
+
+impl Axes {
+    /// Around all points, and some of the way to come.
+    fn of(graph: &Graph, rect: Rect) -> Self {
+        let points = || graph.current.iter().chain(&graph.previous);
+        let range = |values: &mut dyn Iterator<Item = f64>, default: (f64, f64)| {
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(decade(x)), high.max(decade(x)))
+            });
+            if low <= high { (low, high) } else { default }
+        };
+        let (first, last) = range(&mut points().map(|p| p.seconds), (-1.0, 1.0));
+        let errors = points().flat_map(|p| [Some(p.noise), p.error]).flatten().filter(|&e| e > 0.0);
+        let (least, most) = range(&mut { errors }, (-2.0, 0.0));
+        Self {
+            rect,
+            seconds: first - 0.05..=(last + 0.3).max(first + 1.0),
+            errors: (least - 0.2).min(most - 0.6)..=most + 0.1,
+        }
+    }
+
+    fn place(&self, seconds: f64, error: f64) -> Pos2 {
+        let share = |x: f64, range: &RangeInclusive<f64>| {
+            ((decade(x) - range.start()) / (range.end() - range.start())) as f32
+        };
+        let (x, y) = (share(seconds, &self.seconds), share(error, &self.errors));
+        pos2(
+            self.rect.left() + x * self.rect.width(),
+            self.rect.bottom() - y.clamp(-1.0, 2.0) * self.rect.height(),
+        )
+    }
+}
+
+/// 1, 2 and 5 times each power of ten within `range`; whether it is the 1.
+fn ticks(range: &RangeInclusive<f64>) -> impl Iterator<Item = (f64, bool)> {
+    let (low, high) = (*range.start(), *range.end());
+    let decades = (low.floor() as i32)..=(high.ceil() as i32);
+    decades
+        .flat_map(|d| [1.0, 2.0, 5.0].map(|m| (m * 10f64.powi(d), m == 1.0)))
+        .filter(move |(x, _)| (low..=high).contains(&decade(*x)))
+}
+
+fn plot(painter: &Painter, axes: Axes, graph: &Graph) {
+    let clipped = painter.with_clip_rect(axes.rect.expand(1.0));
+    let font = FontId::proportional(10.0);
+    // Few decades need more words.
+    let sparse = |range: &RangeInclusive<f64>| range.end() - range.start() < 2.2;
+    for (seconds, round) in ticks(&axes.seconds) {
+        let x = axes.place(seconds, 1.0).x;
+        if round || sparse(&axes.seconds) {
+            painter.vline(x, axes.rect.y_range(), Stroke::new(1.0, LINE));
+            let at = pos2(x, axes.rect.bottom() + 3.0);
+            painter.text(at, Align2::CENTER_TOP, short_time(seconds), font.clone(), FAINT);
+        }
+    }
+    for (error, round) in ticks(&axes.errors) {
+        let y = axes.place(1.0, error).y;
+        if round || sparse(&axes.errors) {
+            painter.hline(axes.rect.x_range(), y, Stroke::new(1.0, LINE));
+            let at = pos2(axes.rect.left() - 4.0, y);
+            painter.text(at, Align2::RIGHT_CENTER, percent(error), font.clone(), FAINT);
+        }
+    }
+    curve(&clipped, &axes, &graph.previous, |p| Some(p.noise), FAINT.gamma_multiply(0.8));
+    if let (Some(law), Some(last)) = (graph.law, graph.current.last()) {
+        heading(&clipped, &axes, law, last);
+    }
+    band(&clipped, &axes, &graph.current);
+    curve(&clipped, &axes, &graph.current, |p| Some(p.noise), ACCENT);
+    curve(&clipped, &axes, &graph.current, |p| p.error, TRUTH);
+    if let Some(last) = graph.current.last() {
+        clipped.circle_filled(axes.place(last.seconds, last.noise), 3.0, ACCENT);
+    }
+}
+
+/// Without the space and the zero: labels stand close.
+fn short_time(seconds: f64) -> String {
+    if seconds < 1.0 { format!("{seconds} s") } else { duration(seconds).replace(".0", "") }
+}
+
+fn curve(
+    painter: &Painter,
+    axes: &Axes,
+    points: &[Point],
+    error: impl Fn(&Point) -> Option<f64>,
+    color: Color32,
+) {
+    let line: Vec<Pos2> = points.iter().filter_map(|p| Some(axes.place(p.seconds, error(p)?))).collect();
+    painter.add(Shape::line(line, Stroke::new(1.6, color)));
+}
+
+/// The interval around each estimate.
+fn band(painter: &Painter, axes: &Axes, points: &[Point]) {
+    for pair in points.windows(2) {
+        let corner = |p: &Point, sign: f64| axes.place(p.seconds, p.noise + sign * p.doubt);
+        let [a, b] = [&pair[0], &pair[1]];
+        let corners = vec![corner(a, 1.0), corner(b, 1.0), corner(b, -1.0), corner(a, -1.0)];
+        painter.add(Shape::convex_polygon(corners, ACCENT.gamma_multiply(0.22), Stroke::NONE));
+    }
+}
+
+/// On from the last point as the law says.
+fn heading(painter: &Painter, axes: &Axes, law: PowerLaw, last: &Point) {
+    let speed = last.samples / last.seconds;
+    let end = 10f64.powf(*axes.seconds.end());
+    let noise = |seconds: f64| law.a * (seconds * speed).powf(-law.b);
+    let ends = [axes.place(last.seconds, noise(last.seconds)), axes.place(end, noise(end))];
+    painter.add(Shape::dashed_line(&ends, Stroke::new(1.2, ACCENT.gamma_multiply(0.7)), 4.0, 4.0));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(seconds: f64, noise: f64) -> Point {
+        Point { seconds, samples: seconds, noise, doubt: 0.1 * noise, error: None }
+    }
+
+    #[test]
+    fn a_power_law_is_a_straight_line_within_the_axes() {
+        let rect = Rect::from_min_size(pos2(10.0, 20.0), vec2(300.0, 200.0));
+        let current: Vec<Point> = (0..20).map(|i| 1.3f64.powi(i)).map(|s| point(s, 0.3 / s.sqrt())).collect();
+        let graph = Graph { current: current.clone(), ..Graph::default() };
+        let axes = Axes::of(&graph, rect);
+        let places: Vec<Pos2> = current.iter().map(|p| axes.place(p.seconds, p.noise)).collect();
+        assert!(places.iter().all(|p| rect.contains(*p)), "{places:?}");
+        let slope = |a: Pos2, b: Pos2| (b.y - a.y) / (b.x - a.x);
+        let first = slope(places[0], places[1]);
+        assert!(first > 0.0, "down is down");
+        assert!(places.windows(2).all(|w| (slope(w[0], w[1]) / first - 1.0).abs() < 1e-2));
+    }
+
+    #[test]
+    fn ticks_are_round_numbers_inside() {
+        let found: Vec<f64> = ticks(&(-1.0..=1.0)).map(|(x, _)| x).collect();
+        assert_eq!(found, [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]);
+    }
+
+    #[test]
+    fn no_points_and_odd_ones_have_axes_too() {
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(30.0, 20.0));
+        for current in [vec![], vec![point(0.0, 0.0)], vec![point(1.0, f64::NAN)], vec![point(1e300, 1e300)]]
+        {
+            let axes = Axes::of(&Graph { current, ..Graph::default() }, rect);
+            assert!(axes.seconds.start() < axes.seconds.end() && axes.errors.start() < axes.errors.end());
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! The status: a strip of values, and below it all the others.
+
+use super::super::status::{Cell, Measured, Status, caution, details, headline};
+use super::card;
+use super::style::{BRIGHT, CAUTION, FAINT, MARGIN};
+use egui::{Align2, Context, Grid, RichText, Ui, vec2};
+
+/// Shows the strip, and `all` the rest.
+pub fn show(context: &Context, status: &Status, measured: Measured, all: bool) {
+    card(context, "status", Align2::LEFT_TOP, vec2(MARGIN, MARGIN), |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 18.0;
+            for cell in headline(status) {
+                show_cell(ui, &cell);
+            }
+        });
+        if let Some(text) = caution(status) {
+            ui.label(RichText::new(text).color(CAUTION).small());
+        }
+        if all {
+            ui.add_space(2.0);
+            Grid::new("details").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
+                for cell in details(status, measured) {
+                    ui.label(RichText::new(cell.label).color(FAINT));
+                    ui.label(cell.value);
+                    ui.end_row();
+                }
+            });
+        }
+    });
+}
+
+fn show_cell(ui: &mut Ui, cell: &Cell) {
+    ui.vertical(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        // A short value shall not break the name above it.
+        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
+        ui.label(RichText::new(cell.label).color(FAINT).small());
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 5.0;
+            ui.label(RichText::new(&cell.value).color(BRIGHT).heading());
+            if !cell.note.is_empty() {
+                ui.label(RichText::new(&cell.note).color(FAINT));
+            }
+        });
+    });
+}
