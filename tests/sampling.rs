@@ -286,7 +286,9 @@ fn bsdf(material: Material) -> Bsdf {
         error: Vec3::ZERO,
         geometric_normal: Vec3::Z,
         normal: Vec3::Z,
-        uv: Vec2::ZERO,
+        tangent: Vec4::ZERO,
+        wo: Vec3::Z,
+        uvs: [Vec2::ZERO; 2],
         color: Vec4::ONE,
         front: true,
     };

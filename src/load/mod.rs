@@ -19,6 +19,7 @@ mod picture;
 mod report;
 mod settings;
 mod source;
+mod tangents;
 
 pub use builtin::{BuiltIn, built_in_scenes};
 pub use error::{LoadError, ReadError};

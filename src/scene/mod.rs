@@ -15,7 +15,7 @@ pub mod transform;
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Projection};
 pub use light::{Emission, Light, Visible};
-pub use material::{Alpha, Glass, Glossy, Material, TextureUse};
+pub use material::{Alpha, Glass, Glossy, Material, NormalMap, TextureUse};
 pub use mesh::{Instance, Mesh, TriangleMesh};
 pub use texture::{Encoding, Filter, Texels, Texture, Wrap};
 pub use transform::{GlobalTransform, Transform, propagate_transforms};

@@ -1,7 +1,7 @@
 //! Materials and textures → numbered surfaces.
 
 use super::Redone;
-use crate::scene::{Alpha, Encoding, Filter, Glossy, Material, Texels, Texture, TextureUse, Wrap};
+use crate::scene::{Alpha, Encoding, Filter, Glossy, Material, NormalMap, Texels, Texture, TextureUse, Wrap};
 use crate::trace::scene::{Coverage, Surface, TextureIndex};
 use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
@@ -40,8 +40,8 @@ pub fn sync_surfaces(
     renumber(&mut numbers, materials.iter().map(|(e, _)| e).collect(), 1);
     renumber(&mut texture_numbers, textures.iter().map(|(e, _)| e).collect(), 0);
     let resolve = |texture: Option<TextureUse>| {
-        let TextureUse { texture, uv_transform } = texture?;
-        texture_numbers.get(&texture).map(|&index| TextureIndex { index, uv_transform })
+        let TextureUse { texture, uv_transform, second_uvs } = texture?;
+        texture_numbers.get(&texture).map(|&index| TextureIndex { index, uv_transform, second_uvs })
     };
     let room = |numbers: &HashMap<Entity, u32>| numbers.values().max().map_or(0, |&n| n as usize + 1);
     let mut list = vec![Surface::from(Material::default()); room(&numbers).max(1)];
@@ -54,6 +54,9 @@ pub fn sync_surfaces(
                 _ => None,
             }),
             emission_texture: resolve(material.emission_texture),
+            normal_map: material.normal_map.and_then(|NormalMap { texture, scale }| {
+                resolve(Some(texture)).map(|texture| NormalMap { texture, scale })
+            }),
         };
     }
     // Numbers that are free for the moment show nothing.

@@ -190,7 +190,7 @@ impl Batch {
         let (instance, surface) = scene.surface_at(&hit);
         let at = Interaction::new(scene, instance, &hit, &path.ray);
         if surface.material.unlit {
-            let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
+            let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
             let shown = surface.material.base_color * texel.truncate();
             self.radiance[path.entry as usize] += path.throughput * shown;
             return;
@@ -335,8 +335,8 @@ fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &Ligh
     let (data, surface) = scene.surface_at(&hit);
     let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
     let corners = data.mesh.triangles[triangle as usize];
-    let uv = super::scene::interpolate(&data.mesh.uvs, corners, weights).unwrap_or_default();
-    surface.material.emission * scene.texture(surface.emission_texture, uv).truncate()
+    let uvs = super::scene::both_uvs(&data.mesh, corners, weights);
+    surface.material.emission * scene.texture(surface.emission_texture, uvs).truncate()
 }
 
 /// Weight of a sample of density `a` that might have been taken with density `b`.

@@ -5,7 +5,7 @@ use super::texture::{Textures, uses};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::load::settings::Materials;
-use crate::scene::{Alpha, Encoding, Glass, Glossy, Material};
+use crate::scene::{Alpha, Encoding, Glass, Glossy, Material, NormalMap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -24,8 +24,8 @@ pub(super) struct Palette {
     pub(super) materials: Vec<Entity>,
     /// For primitives that name none.
     default: Option<Entity>,
-    /// Which `TEXCOORD_n` each material wants.
-    pub(super) uv_sets: Vec<u32>,
+    /// Which `TEXCOORD_n` each material wants as first and as second set.
+    pub(super) uv_sets: Vec<[u32; 2]>,
 }
 
 impl Palette {
@@ -46,49 +46,47 @@ pub(super) fn spawn_all(
 ) -> Result<Palette, LoadError> {
     if let Some(all) = overrides.all {
         let count = document.root.materials.len();
-        return Ok(Palette { materials: vec![all; count], default: Some(all), uv_sets: vec![0; count] });
+        return Ok(Palette { materials: vec![all; count], default: Some(all), uv_sets: vec![[0; 2]; count] });
     }
     let mut textures = Textures::new(document, sink)?;
     let mut palette = Palette { materials: Vec::new(), default: None, uv_sets: Vec::new() };
     for (i, material) in document.root.materials.iter().enumerate() {
         let name = material.name.clone().unwrap_or_else(|| format!("material {i}"));
-        palette.uv_sets.push(uv_set(document, material, &name, sink));
+        let sets = uv_sets(document, material, &name, sink);
+        palette.uv_sets.push(sets);
         let entity = match overrides.replacement(&name) {
             Some(entity) => entity,
             None => {
-                let component = convert(document, material, &name, &mut textures, sink);
+                let component = convert(document, material, &name, sets, &mut textures, sink);
                 sink.spawn((Name::new(name), component))
             }
         };
         palette.materials.push(entity);
     }
-    let with_normal_map = document.root.materials.iter().filter(|m| m.normal_texture.is_some()).count();
-    if with_normal_map > 0 {
-        sink.warn(format!(
-            "{}: normal maps are not supported and ignored ({with_normal_map} materials)",
-            document.file
-        ));
-    }
     Ok(palette)
 }
 
-/// A mesh has one set of texture coordinates: the one that the first texture asks for.
-fn uv_set(document: &Document<'_>, material: &json::Material, name: &str, sink: &mut Sink<'_>) -> u32 {
+/// A mesh has two sets of texture coordinates: the first two that the material's textures ask for.
+fn uv_sets(document: &Document<'_>, material: &json::Material, name: &str, sink: &mut Sink<'_>) -> [u32; 2] {
     let uses = uses(material);
-    let set = uses.first().map_or(0, |first| first.uv_set);
-    if uses.iter().any(|other| other.uv_set != set) {
+    let first = uses.first().map_or(0, |first| first.uv_set);
+    let mut others = uses.iter().map(|other| other.uv_set).filter(|&set| set != first);
+    let second = others.next().unwrap_or(first);
+    if others.any(|set| set != second) {
         let file = document.file;
         sink.warn(format!(
-            "{file}: material `{name}`: its textures use several TEXCOORD sets; all get TEXCOORD_{set}"
+            "{file}: material `{name}`: its textures use more than two TEXCOORD sets; all but TEXCOORD_{first} \
+             get TEXCOORD_{second}"
         ));
     }
-    set
+    [first, second]
 }
 
 fn convert(
     document: &Document<'_>,
     material: &json::Material,
     name: &str,
+    sets: [u32; 2],
     textures: &mut Textures<'_>,
     sink: &mut Sink<'_>,
 ) -> Material {
@@ -146,13 +144,17 @@ fn convert(
         base_color: if is_glass { Vec3::ZERO } else { base_color },
         base_color_texture: base_texture
             .filter(|_| !is_glass)
-            .and_then(|info| textures.get(info, Encoding::Srgb, sink)),
+            .and_then(|info| textures.get(info, Encoding::Srgb, sets, sink)),
         glossy: if is_glass || unlit {
             Glossy::None
         } else {
-            let texture = rough_texture.and_then(|info| textures.get(info, Encoding::Linear, sink));
+            let texture = rough_texture.and_then(|info| textures.get(info, Encoding::Linear, sets, sink));
             Glossy::Ggx { metallic, roughness, texture }
         },
+        normal_map: material.normal_texture.as_ref().filter(|_| !unlit).and_then(|normal| {
+            let texture = textures.get(normal, Encoding::Linear, sets, sink)?;
+            Some(NormalMap { texture, scale: if normal.scale.is_finite() { normal.scale } else { 1.0 } })
+        }),
         mirror: Vec3::ZERO,
         glass: is_glass.then_some(glass),
         emission: if emission_is_legal { emission } else { Vec3::ZERO },
@@ -160,7 +162,7 @@ fn convert(
             .emissive_texture
             .as_ref()
             .filter(|_| emission != Vec3::ZERO)
-            .and_then(|info| textures.get(info, Encoding::Srgb, sink)),
+            .and_then(|info| textures.get(info, Encoding::Srgb, sets, sink)),
         alpha: match material.alpha_mode {
             Checked::Valid(AlphaMode::Mask) => Alpha::Mask(unit(material.alpha_cutoff.unwrap_or_default().0)),
             Checked::Valid(AlphaMode::Blend) => Alpha::Blend,

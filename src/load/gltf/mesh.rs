@@ -7,6 +7,7 @@ use super::{Document, skin};
 use crate::load::error::LoadError;
 use crate::load::geometry::{self, Part};
 use crate::load::report::Sink;
+use crate::load::tangents;
 use crate::scene::Mesh;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -67,10 +68,10 @@ impl Meshes {
                 )?,
                 None => palette.default_material(document.file, sink),
             };
-            let uv_set = primitive.material.as_ref().map_or(0, |m| palette.uv_sets[m.value()]);
+            let uv_sets = primitive.material.as_ref().map_or([0; 2], |m| palette.uv_sets[m.value()]);
             let joints = skin.map(|(_, joints)| joints);
             let Some(mut part) =
-                read_primitive(document, primitive, uv_set, &mesh.weights, joints, &place, sink)?
+                read_primitive(document, primitive, uv_sets, &mesh.weights, joints, &place, sink)?
             else {
                 continue;
             };
@@ -88,7 +89,8 @@ impl Meshes {
                 u16::try_from(slot).map_err(|_| document.broken(&place, "more than 65536 materials"))?;
             parts.push(part);
         }
-        let done = geometry::finish(geometry::merge(parts));
+        let mut done = geometry::finish(geometry::merge(parts));
+        tangents::complete_for(&mut done.mesh, &materials, &format!("{}: {label}", document.file), sink);
         for line in done.mended.lines() {
             sink.warn(format!("{}: {label}: {line}", document.file));
         }
@@ -105,7 +107,7 @@ impl Meshes {
 fn read_primitive(
     document: &Document<'_>,
     primitive: &Primitive,
-    uv_set: u32,
+    uv_sets: [u32; 2],
     weights: &Option<Vec<f32>>,
     joints: Option<&[DAffine3]>,
     place: &str,
@@ -139,11 +141,18 @@ fn read_primitive(
         return Err(document.broken(place, "no POSITION: nothing says where its vertices are"));
     };
     let normals = attribute(Semantic::Normals, &[3])?;
-    let mut uvs = attribute(Semantic::TexCoords(uv_set), &[2])?;
-    if uvs.is_none() && uv_set != 0 {
-        sink.warn(format!("{file}: {place}: no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
-        uvs = attribute(Semantic::TexCoords(0), &[2])?;
-    }
+    let texture_coordinates = |set: u32, sink: &mut Sink<'_>| {
+        let uvs = attribute(Semantic::TexCoords(set), &[2])?;
+        if uvs.is_some() || set == 0 {
+            return Ok(uvs);
+        }
+        sink.warn(format!("{file}: {place}: no TEXCOORD_{set}, TEXCOORD_0 instead"));
+        attribute(Semantic::TexCoords(0), &[2])
+    };
+    let uvs = texture_coordinates(uv_sets[0], sink)?;
+    let second_uvs = if uv_sets[1] == uv_sets[0] { None } else { texture_coordinates(uv_sets[1], sink)? };
+    // Without normals they don't count (glTF 2.0 specification, 3.7.2.1).
+    let tangents = attribute(Semantic::Tangents, &[4])?.filter(|_| normals.is_some());
     let colors = attribute(Semantic::Colors(0), &[3, 4])?;
     let skinning = match joints {
         Some(matrices) => attribute(Semantic::Joints(0), &[4])?
@@ -152,7 +161,7 @@ fn read_primitive(
         None => None,
     };
     let bound = skinning.as_ref().map(|(_, joints, weights)| [joints, weights]);
-    let attributes = [normals.as_ref(), uvs.as_ref(), colors.as_ref()];
+    let attributes = [&normals, &uvs, &second_uvs, &tangents, &colors].map(Option::as_ref);
     for other in attributes.into_iter().flatten().chain(bound.into_iter().flatten()) {
         if other.count != positions.count {
             let problem = format!("attribute has a count of {}, POSITION {}", other.count, positions.count);
@@ -167,6 +176,8 @@ fn read_primitive(
         normals: normals
             .map(|n| vertices.clone().map(|v| Vec3::from(morphs.apply(1, v, n.get_f32(v)))).collect()),
         uvs: uvs.map(|uvs| vertices.clone().map(|v| Vec2::from(uvs.get_f32(v))).collect()),
+        second_uvs: second_uvs.map(|uvs| vertices.clone().map(|v| Vec2::from(uvs.get_f32(v))).collect()),
+        tangents: tangents.map(|t| vertices.clone().map(|v| Vec4::from(t.get_f32(v))).collect()),
         colors: colors.map(|c| vertices.clone().map(|v| color(&c, v)).collect()),
         triangles: used.triangles,
         slot: 0,

@@ -63,6 +63,11 @@ pub(super) fn pose(
         }
         let position = part.positions[i].as_dvec3();
         part.positions[i] = ((sum.matrix3 * position + sum.translation) / total).as_vec3();
+        if let Some(tangents) = &mut part.tangents {
+            let turned = (sum.matrix3 * tangents[i].truncate().as_dvec3()).normalize_or_zero().as_vec3();
+            // A mirroring pose turns the cross product of normal and tangent round.
+            tangents[i] = turned.extend(tangents[i].w * sum.matrix3.determinant().signum() as f32);
+        }
         if let Some(normals) = &mut part.normals {
             // Cofactors are the inverse transpose times the determinant, and exist for flat matrices too.
             let [x, y, z] = [sum.matrix3.x_axis, sum.matrix3.y_axis, sum.matrix3.z_axis];

@@ -138,7 +138,7 @@ impl Textures {
                 Texture { texels, encoding: Encoding::Srgb, wrap: map.wrap(), filter: Filter::Bilinear };
             sink.spawn((Name::new(map.name.to_owned()), texture))
         });
-        TextureUse { texture, uv_transform: map.uv_transform() }
+        TextureUse { texture, uv_transform: map.uv_transform(), second_uvs: false }
     }
 }
 

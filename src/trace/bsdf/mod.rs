@@ -2,6 +2,8 @@
 //!
 //! Directions leave the surface: `wo` to the eye, `wi` to the light, both of unit length.
 
+pub mod normal;
+
 use super::TraceScene;
 use super::scene::Surface;
 use super::surface::Interaction;
@@ -68,10 +70,20 @@ impl Bsdf {
     #[must_use]
     pub fn new(scene: &TraceScene, surface: &Surface, at: &Interaction) -> Self {
         let material = &surface.material;
-        let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
+        let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
         let base = material.base_color * texel.truncate();
+        let mut normal = match &surface.normal_map {
+            Some(map) => normal::tilted(scene, map, at),
+            None => at.normal,
+        };
+        let mirrors = !matches!(material.glossy, Glossy::None)
+            || surface.normal_map.is_some()
+            || material.mirror != Vec3::ZERO
+            || material.glass.is_some();
+        // Lambert looks the same from everywhere: there it is enough that the normal is seen at all.
+        normal = if mirrors { normal::clear_of_surface(normal, at) } else { normal::facing(normal, at) };
         let mut bsdf = Self {
-            normal: at.normal,
+            normal,
             geometric_normal: at.geometric_normal,
             diffuse: base,
             glossy: Lobe::None,
@@ -85,7 +97,7 @@ impl Bsdf {
                 bsdf.glossy = Lobe::BlinnPhong { specular: *specular, exponent: *exponent };
             }
             Glossy::Ggx { metallic, roughness, .. } => {
-                let texel = scene.texture(surface.glossy_texture, at.uv);
+                let texel = scene.texture(surface.glossy_texture, at.uvs);
                 let (metallic, roughness) = (metallic * texel.z, roughness * texel.y);
                 let f0 = Vec3::splat(0.04).lerp(base, metallic);
                 bsdf.diffuse = base * (1.0 - metallic);
