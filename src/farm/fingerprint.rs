@@ -84,7 +84,7 @@ impl Fingerprint {
             }
             print.debug(&material);
             print.debug(&[surface.base_color_texture, surface.glossy_texture, surface.emission_texture]);
-            print.debug(&surface.normal_map);
+            print.debug(&(&surface.normal_map, &surface.layers));
         }
         for texture in &scene.surfaces.textures {
             print.debug(&(texture.texels.width, texture.texels.height));

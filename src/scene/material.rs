@@ -1,5 +1,6 @@
 //! What surfaces are made of.
 
+use super::Layers;
 use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec3};
 
@@ -14,6 +15,8 @@ pub struct Material {
     pub base_color_texture: Option<TextureUse>,
     /// The glossy lobe.
     pub glossy: Glossy,
+    /// What extensions add to [`Glossy::Ggx`].
+    pub layers: Option<Box<Layers>>,
     /// Tilts the shading normal.
     pub normal_map: Option<NormalMap>,
     /// Reflectance of a perfect mirror on top (MTL `illum 3`, `5`).
@@ -98,6 +101,13 @@ pub struct NormalMap<T = TextureUse> {
     pub scale: f32,
 }
 
+impl<T> NormalMap<T> {
+    /// The same with another name for the texture; without one it is gone.
+    pub fn renamed<U>(self, name: impl FnOnce(T) -> Option<U>) -> Option<NormalMap<U>> {
+        name(self.texture).map(|texture| NormalMap { texture, scale: self.scale })
+    }
+}
+
 impl From<Entity> for TextureUse {
     fn from(texture: Entity) -> Self {
         Self { texture, uv_transform: Affine2::IDENTITY, second_uvs: false }
@@ -111,6 +121,7 @@ impl Default for Material {
             base_color: Vec3::splat(0.8),
             base_color_texture: None,
             glossy: Glossy::None,
+            layers: None,
             normal_map: None,
             mirror: Vec3::ZERO,
             glass: None,

@@ -6,6 +6,7 @@
 pub mod bounds;
 pub mod camera;
 pub mod color;
+pub mod layers;
 pub mod light;
 pub mod material;
 pub mod mesh;
@@ -14,6 +15,7 @@ pub mod transform;
 
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Projection};
+pub use layers::{Anisotropy, Body, Clearcoat, Layers, Sheen, Transmission};
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, NormalMap, TextureUse};
 pub use mesh::{Instance, Mesh, TriangleMesh};

@@ -4,7 +4,7 @@
 //! shadows, keep the paths that go on. The result for a sample is a function of its
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
-use super::bsdf::{Bsdf, Lobes};
+use super::bsdf::{Bsdf, Evaluated, Lobes};
 use super::film::Tile;
 use super::light::{FlatLight, LightSample};
 use super::pass::RayCounts;
@@ -29,6 +29,8 @@ struct Path {
     bounce: Option<Bounce>,
     /// Only collects what shines at its end.
     last: bool,
+    /// Absorption coefficient of the body that the ray crosses; zero outside.
+    absorption: Vec3,
 }
 
 /// The smooth bounce that a ray comes from.
@@ -110,6 +112,7 @@ impl Batch {
                     depth: 0,
                     bounce: None,
                     last: false,
+                    absorption: Vec3::ZERO,
                 });
             }
         }
@@ -141,7 +144,12 @@ impl Batch {
         let random = |i: usize, key: u32| paths[i].sampler.hashed(key ^ paths[i].depth);
         scene.closest_hits(&self.rays, &mut self.hits, random);
         for i in 0..self.paths.len() {
-            let path = self.paths[i];
+            let mut path = self.paths[i];
+            if path.absorption != Vec3::ZERO
+                && let Some(hit) = self.hits[i]
+            {
+                path.throughput *= passed(path.absorption, hit.t * path.ray.direction.length());
+            }
             self.arrive(scene, &path, self.hits[i]);
         }
         rays.shadow += self.connect_lights(scene);
@@ -228,7 +236,6 @@ impl Batch {
     /// Queues shadow rays to lights, and the ray that goes on.
     fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
         let bsdf = at.bsdf(scene, surface);
-        let wo = -path.ray.direction;
         let base = 1 + path.depth * PAIRS_PER_BOUNCE;
         // Direct lighting finds Lambert's share by light samples alone: no ray is spent on it.
         let followed = match scene.settings.integrator {
@@ -251,7 +258,7 @@ impl Batch {
             return;
         }
         let choice = path.sampler.pair(base + LOBE);
-        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), followed) else {
+        let Some(sample) = bsdf.sample(choice.x, path.sampler.pair(base + DIRECTION), followed) else {
             return;
         };
         let mut throughput = path.throughput * sample.weight;
@@ -262,7 +269,16 @@ impl Batch {
             }
             throughput /= survival;
         }
-        let smooth = sample.pdf.is_some();
+        let absorption = match surface.body() {
+            Some(body) if at.geometric_normal.dot(sample.wi) < 0.0 => {
+                if at.front {
+                    body.absorption
+                } else {
+                    Vec3::ZERO
+                }
+            }
+            _ => path.absorption,
+        };
         self.next.push(Path {
             entry: path.entry,
             sampler: path.sampler,
@@ -270,7 +286,8 @@ impl Batch {
             throughput,
             depth: path.depth + 1,
             bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal() }),
-            last: smooth && scene.settings.integrator == Integrator::Direct,
+            last: !sample.follow && scene.settings.integrator == Integrator::Direct,
+            absorption,
         });
     }
 
@@ -289,13 +306,11 @@ impl Batch {
         chance: f32,
         sample: &LightSample,
     ) {
-        let wo = -path.ray.direction;
-        let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
+        let Evaluated { diffuse, glossy, pdf: bounce_pdf } = bsdf.evaluate(sample.wi, followed);
         let weight = match sample.pdf {
             None => (diffuse + glossy) / chance,
             Some(pdf) => {
                 let light_pdf = pdf * chance;
-                let bounce_pdf = bsdf.pdf(wo, sample.wi, followed);
                 let shared = power_heuristic(light_pdf, bounce_pdf);
                 // What no bounce would find is the light samples' alone.
                 (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
@@ -304,6 +319,10 @@ impl Batch {
         let mut contribution = path.throughput * weight * sample.radiance;
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, sample);
+        }
+        if path.absorption != Vec3::ZERO && at.geometric_normal.dot(sample.wi) > 0.0 {
+            let distance = sample.target.map_or(f32::MAX, |target| target.distance(at.position));
+            contribution *= passed(path.absorption, distance);
         }
         if contribution == Vec3::ZERO {
             return;
@@ -327,6 +346,11 @@ impl Batch {
             key: light.wrapping_add(path.depth << 16).wrapping_add(1 << 31),
         });
     }
+}
+
+/// What is left after that way (J. H. Lambert, "Photometria", 1760; A. Beer, 1852).
+fn passed(absorption: Vec3, distance: f32) -> Vec3 {
+    (-absorption * distance).exp()
 }
 
 /// Radiance of an emissive triangle at a sampled point.

@@ -1,10 +1,11 @@
 //! The scene as rays need it: flat arrays, indices for references.
 
+use super::bsdf::Passed;
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
 use crate::bvh::{Accept, Hit, Ray, Tlas};
-use crate::scene::{Alpha, Material, NormalMap, Texture, TriangleMesh};
+use crate::scene::{Alpha, Body, Layers, Material, NormalMap, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -66,6 +67,10 @@ pub struct Surface {
     pub emission_texture: Option<TextureIndex>,
     /// Tilts the shading normal.
     pub normal_map: Option<NormalMap<TextureIndex>>,
+    /// What extensions add to metallic-roughness.
+    pub layers: Option<Box<Layers<TextureIndex>>>,
+    /// How much a rough body lets through, if the surface is one.
+    pub passed: Option<Arc<Passed>>,
 }
 
 /// A texture and how to reach into it.
@@ -79,6 +84,14 @@ pub struct TextureIndex {
     pub second_uvs: bool,
 }
 
+impl Surface {
+    /// The body behind the surface, if light can enter it.
+    #[must_use]
+    pub fn body(&self) -> Option<Body> {
+        self.layers.as_ref()?.transmission.as_ref()?.body
+    }
+}
+
 impl From<Material> for Surface {
     fn from(material: Material) -> Self {
         Self {
@@ -87,6 +100,8 @@ impl From<Material> for Surface {
             glossy_texture: None,
             emission_texture: None,
             normal_map: None,
+            layers: None,
+            passed: None,
         }
     }
 }

@@ -8,8 +8,13 @@
 
 #[path = "../support/alone.rs"]
 mod alone;
+#[path = "../support/chi_square.rs"]
+mod chi_square;
+mod energy;
 #[path = "../support/geometry.rs"]
 mod geometry;
+mod kinds;
 mod normals;
+mod samplers;
 #[path = "../support/stage.rs"]
 mod stage;

@@ -151,6 +151,7 @@ fn convert(
             let texture = rough_texture.and_then(|info| textures.get(info, Encoding::Linear, sets, sink));
             Glossy::Ggx { metallic, roughness, texture }
         },
+        layers: None,
         normal_map: material.normal_texture.as_ref().filter(|_| !unlit).and_then(|normal| {
             let texture = textures.get(normal, Encoding::Linear, sets, sink)?;
             Some(NormalMap { texture, scale: if normal.scale.is_finite() { normal.scale } else { 1.0 } })

@@ -202,6 +202,7 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
             None if uses_specular && !is_mirror => Glossy::BlinnPhong { specular, exponent },
             None => Glossy::None,
         },
+        layers: None,
         normal_map: None,
         mirror: if uses_specular && is_mirror { specular } else { Vec3::ZERO },
         glass: is_glass.then_some(Glass { ior, tint }),

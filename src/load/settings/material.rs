@@ -159,6 +159,7 @@ fn convert(table: &MaterialTable, check: &mut Check) -> Material {
         } else {
             Glossy::None
         },
+        layers: None,
         normal_map: None,
         mirror,
         glass: table.glass.as_ref().map(|_| Glass { ior, tint }),
