@@ -11,9 +11,8 @@ use std::collections::HashMap;
 /// mesh.
 pub(super) fn complete_for(mesh: &mut TriangleMesh, materials: &[Entity], place: &str, sink: &mut Sink<'_>) {
     let world = &*sink.world;
-    let normal_map = |material: &Entity| world.get::<Material>(*material)?.normal_map;
     let wants: Vec<_> =
-        materials.iter().map(|material| normal_map(material).map(|map| map.texture.second_uvs)).collect();
+        materials.iter().map(|material| world.get::<Material>(*material).and_then(directed)).collect();
     if wants.iter().all(Option::is_none) {
         // Nobody will look at them.
         mesh.tangents = Vec::new();
@@ -22,10 +21,21 @@ pub(super) fn complete_for(mesh: &mut TriangleMesh, materials: &[Entity], place:
     let without = complete(mesh, &wants);
     if without > 0 {
         sink.warn(format!(
-            "{place}: {without} corners have a normal map, but texture coordinates that say nothing about its \
-             direction: it is left out there"
+            "{place}: {without} corners have a normal map or a brush, but texture coordinates that say \
+             nothing about its direction: it is left out there"
         ));
     }
+}
+
+/// Whether a material has directions along its surface, and whether by the second texture coordinates.
+fn directed(material: &Material) -> Option<bool> {
+    let layers = material.layers.as_ref();
+    let coat = layers.and_then(|layers| layers.clearcoat.as_ref()?.normal_map);
+    let map = material.normal_map.or(coat).map(|map| map.texture.second_uvs);
+    map.or_else(|| {
+        let brushed = layers?.anisotropy.as_ref()?;
+        Some(brushed.texture.is_some_and(|texture| texture.second_uvs))
+    })
 }
 
 /// Gives tangents to the triangles that want and have none; returns how many corners remain without, for

@@ -4,6 +4,7 @@
 
 mod framing;
 mod gltf;
+mod layers;
 mod normal_maps;
 mod obj;
 mod settings;

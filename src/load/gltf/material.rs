@@ -1,11 +1,12 @@
 //! glTF materials.
 
 use super::Document;
+use super::layers::{self, Extensions};
 use super::texture::{Textures, uses};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::load::settings::Materials;
-use crate::scene::{Alpha, Encoding, Glass, Glossy, Material, NormalMap};
+use crate::scene::{Alpha, Encoding, Glossy, Material, NormalMap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -13,10 +14,6 @@ use gltf::json;
 use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 use std::cell::Cell;
-
-/// Above this, and below [`GLASS_ROUGHNESS`], a transmissive material becomes clear glass.
-const GLASS_TRANSMISSION: f32 = 0.5;
-const GLASS_ROUGHNESS: f32 = 0.25;
 
 /// Material entities of a file.
 pub(super) struct Palette {
@@ -105,59 +102,46 @@ fn convert(
     let mut roughness = unit(pbr.roughness_factor.0);
     let mut base_texture = pbr.base_color_texture.as_ref();
     let mut rough_texture = pbr.metallic_roughness_texture.as_ref();
+    let unlit = extensions.unlit.is_some();
+    let asked = Extensions::of(material);
+    for name in &asked.odd {
+        sink.warn(format!("{}: material `{name}`: {name} is not as specified, ignored", document.file));
+    }
+    let mut layers = if unlit { None } else { asked.layers(sets, &unit, textures, sink) };
+    let mut roughness_texture = None;
     if let Some(old) = &extensions.pbr_specular_glossiness {
         let [r, g, b, a] = old.diffuse_factor.0.map(unit);
-        let specular = Vec3::from(old.specular_factor.0.map(unit));
-        let diffuse = Vec3::new(r, g, b);
-        // A dielectric reflects about 4 %; what reflects far more than it scatters is a metal.
-        let is_metal = old.diffuse_texture.is_none()
-            && specular.max_element() > 0.25
-            && specular.max_element() > diffuse.max_element();
-        base_color = if is_metal { specular } else { diffuse };
-        (opacity, metallic, roughness) =
-            (a, f32::from(u8::from(is_metal)), 1.0 - unit(old.glossiness_factor.0));
+        (base_color, opacity, metallic) = (Vec3::new(r, g, b), a, 0.0);
         (base_texture, rough_texture) = (old.diffuse_texture.as_ref(), None);
-        sink.warn(format!(
-            "{}: KHR_materials_pbrSpecularGlossiness is approximated by metal and roughness",
-            document.file
-        ));
+        let (reflecting, rough, texture) =
+            layers::of_specular_glossiness(document, old, sets, &unit, textures, sink);
+        layers = Some(reflecting);
+        (roughness, roughness_texture) = (rough, texture);
     }
     let strength = extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength.0);
     let emission = Vec3::from(material.emissive_factor.0) * strength;
     let emission_is_legal = emission.is_finite() && emission.min_element() >= 0.0;
-    let transmission = extensions.transmission.as_ref().map_or(0.0, |t| unit(t.transmission_factor.0));
-    let is_glass = transmission > GLASS_TRANSMISSION && roughness < GLASS_ROUGHNESS && metallic < 0.5;
-    if transmission > 0.0 {
-        let becomes = if is_glass { "clear glass" } else { "opaque" };
-        sink.decide(format!(
-            "{}: material `{name}` transmits {transmission} at roughness {roughness}: shown as {becomes}",
-            document.file
-        ));
-    }
-    let ior = extensions.ior.as_ref().map_or(1.5, |ior| ior.ior.0);
-    let glass = Glass { ior: if ior.is_finite() && ior >= 1.0 { ior } else { 1.5 }, tint: base_color };
     if clamped.get() || !emission_is_legal {
         sink.warn(format!("{}: material `{name}`: factor out of range, clamped", document.file));
     }
-    let unlit = extensions.unlit.is_some();
     Material {
-        base_color: if is_glass { Vec3::ZERO } else { base_color },
-        base_color_texture: base_texture
-            .filter(|_| !is_glass)
-            .and_then(|info| textures.get(info, Encoding::Srgb, sets, sink)),
-        glossy: if is_glass || unlit {
+        base_color,
+        base_color_texture: base_texture.and_then(|info| textures.get(info, Encoding::Srgb, sets, sink)),
+        glossy: if unlit {
             Glossy::None
         } else {
-            let texture = rough_texture.and_then(|info| textures.get(info, Encoding::Linear, sets, sink));
+            let texture = rough_texture
+                .and_then(|info| textures.get(info, Encoding::Linear, sets, sink))
+                .or(roughness_texture);
             Glossy::Ggx { metallic, roughness, texture }
         },
-        layers: None,
+        layers: layers.map(Box::new),
         normal_map: material.normal_texture.as_ref().filter(|_| !unlit).and_then(|normal| {
             let texture = textures.get(normal, Encoding::Linear, sets, sink)?;
             Some(NormalMap { texture, scale: if normal.scale.is_finite() { normal.scale } else { 1.0 } })
         }),
         mirror: Vec3::ZERO,
-        glass: is_glass.then_some(glass),
+        glass: None,
         emission: if emission_is_legal { emission } else { Vec3::ZERO },
         emission_texture: material
             .emissive_texture

@@ -12,6 +12,7 @@
 mod accessor;
 mod buffer;
 mod container;
+mod layers;
 mod light;
 mod material;
 mod mesh;
@@ -29,13 +30,16 @@ use gltf::json::{Index, Root};
 use serde::Deserialize;
 
 /// Extensions that are honoured wholly or closely enough to accept a file that requires them.
-const SUPPORTED: [&str; 15] = [
+const SUPPORTED: [&str; 18] = [
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",

@@ -1,5 +1,6 @@
 //! glTF textures, samplers and images.
 
+use super::layers::Extensions;
 use super::{Document, buffer};
 use crate::load::error::{LoadError, ReadError};
 use crate::load::picture::{self, Picture};
@@ -57,12 +58,11 @@ pub(super) fn uses(material: &json::Material) -> Vec<Use> {
     let base = old.map_or(pbr.base_color_texture.as_ref(), |old| old.diffuse_texture.as_ref());
     let rough = if old.is_some() { None } else { pbr.metallic_roughness_texture.as_ref() };
     let plain = [base, rough, material.emissive_texture.as_ref()];
-    plain
-        .into_iter()
-        .flatten()
-        .map(Use::from)
-        .chain(material.normal_texture.as_ref().map(Use::from))
-        .collect()
+    let mut uses: Vec<Use> = plain.into_iter().flatten().map(Use::from).collect();
+    uses.extend(material.normal_texture.as_ref().map(Use::from));
+    uses.extend(old.and_then(|old| old.specular_glossiness_texture.as_ref()).map(Use::from));
+    uses.extend(Extensions::of(material).uses());
+    uses
 }
 
 /// Texture entities, spawned on first use; images are decoded before.
@@ -120,6 +120,26 @@ impl<'a> Textures<'a> {
             uv_transform: used.transform.as_ref().map_or(Affine2::IDENTITY, uv_transform),
             second_uvs: used.uv_set != sets[0],
         })
+    }
+}
+
+impl Textures<'_> {
+    /// A texture whose texels are made from those of `info`, as data.
+    pub(super) fn made(
+        &mut self,
+        document: &Document<'_>,
+        info: &Info,
+        sets: [u32; 2],
+        sink: &mut Sink<'_>,
+        texel: impl Fn([u8; 4]) -> [u8; 4],
+    ) -> Option<TextureUse> {
+        let given = self.get(info, Encoding::Linear, sets, sink)?;
+        let Texture { texels, wrap, filter, .. } = sink.world.get::<Texture>(given.texture)?.clone();
+        let made = texels.texels.iter().map(|&given| texel(given)).collect();
+        let texels = Arc::new(Texels { width: texels.width, height: texels.height, texels: made });
+        let name = format!("{}: roughness", document.file);
+        let texture = Texture { texels, encoding: Encoding::Linear, wrap, filter };
+        Some(TextureUse { texture: sink.spawn((Name::new(name), texture)), ..given })
     }
 }
 
