@@ -101,7 +101,7 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
         cases.push((format!("metal of roughness {roughness}"), Material { glossy, ..white.clone() }));
     }
     for exponent in [0.0, 1.0, 10.0, 50.0, 1000.0] {
-        let glossy = Glossy::BlinnPhong { specular: Vec3::ONE, exponent };
+        let glossy = Glossy::BlinnPhong { specular: Vec3::ONE, exponent, texture: None };
         cases.push((format!("Blinn-Phong of exponent {exponent}"), Material { glossy, ..black.clone() }));
     }
     for (name, material) in cases {
@@ -203,7 +203,7 @@ fn direct_light_is_the_path_tracers_first_bounce_with_every_kind_of_light() {
         let mut stage = Stage::new(settings(64, 64, integrator, 1));
         let floor = |glossy, albedo: f32| Material { glossy, ..Material::lambert(Vec3::splat(albedo)) };
         let ggx = Glossy::Ggx { metallic: 0.2, roughness: 0.3, texture: None };
-        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.4), exponent: 20.0 };
+        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.4), exponent: 20.0, texture: None };
         stage.add_mesh(quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0), floor(ggx, 0.7), HERE);
         let place = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
         stage.add_mesh(ball(12), floor(phong, 0.4), place(0.0, 1.0, 0.0));

@@ -79,7 +79,7 @@ impl Fingerprint {
             let mut material = surface.material.clone();
             (material.base_color_texture, material.emission_texture, material.normal_map) =
                 (None, None, None);
-            if let Glossy::Ggx { texture, .. } = &mut material.glossy {
+            if let Glossy::Ggx { texture, .. } | Glossy::BlinnPhong { texture, .. } = &mut material.glossy {
                 *texture = None;
             }
             print.debug(&material);

@@ -48,6 +48,8 @@ pub enum Glossy {
         specular: Vec3,
         /// Exponent, 0 or more.
         exponent: f32,
+        /// Its colour multiplies `specular`, its alpha `exponent`.
+        texture: Option<TextureUse>,
     },
     /// glTF metallic-roughness, GGX with Smith masking: glTF 2.0 specification, appendix B.
     Ggx {

@@ -62,8 +62,8 @@ pub fn sync_surfaces(
             material: Material { layers: None, ..material.clone() },
             base_color_texture: resolve(material.base_color_texture),
             glossy_texture: resolve(match material.glossy {
-                Glossy::Ggx { texture, .. } => texture,
-                _ => None,
+                Glossy::Ggx { texture, .. } | Glossy::BlinnPhong { texture, .. } => texture,
+                Glossy::None => None,
             }),
             emission_texture: resolve(material.emission_texture),
             normal_map: material.normal_map.and_then(|map| map.renamed(|texture| resolve(Some(texture)))),

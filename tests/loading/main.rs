@@ -5,6 +5,7 @@
 mod framing;
 mod gltf;
 mod layers;
+mod mtl_maps;
 mod normal_maps;
 mod obj;
 mod settings;

@@ -81,7 +81,7 @@ pub fn pane(factor: f32) -> Option<Transmission> {
 
 /// With the tangent of the typical angle between the normal and the half vector.
 pub fn glossy_kinds() -> Vec<(&'static str, Material, f64)> {
-    let phong = |exponent| Glossy::BlinnPhong { specular: Vec3::splat(0.7), exponent };
+    let phong = |exponent| Glossy::BlinnPhong { specular: Vec3::splat(0.7), exponent, texture: None };
     [
         ("Lambert", Glossy::None, 0.8, 1.0),
         ("GGX of roughness 0.05", ggx(1.0, 0.05), 0.8, 0.0025),

@@ -18,12 +18,14 @@ mod map;
 mod mtl;
 mod polygon;
 mod raw;
+mod relief;
 
 use super::error::LoadError;
 use super::geometry;
 use super::report::Sink;
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
+use super::tangents;
 use crate::scene::{Instance, Material, Mesh};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -56,7 +58,8 @@ pub(super) fn load(
         .iter()
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
-    let done = geometry::finish(assemble::mesh(&raw));
+    let mut done = geometry::finish(assemble::mesh(&raw));
+    tangents::complete_for(&mut done.mesh, &materials, file, sink);
     for line in done.mended.lines() {
         sink.warn(format!("{file}: {line}"));
     }

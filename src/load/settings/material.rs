@@ -149,7 +149,7 @@ fn convert(table: &MaterialTable, check: &mut Check) -> Material {
         base_color,
         base_color_texture: None,
         glossy: if is_phong {
-            Glossy::BlinnPhong { specular, exponent }
+            Glossy::BlinnPhong { specular, exponent, texture: None }
         } else if is_ggx {
             Glossy::Ggx {
                 metallic: check.unit("metallic", table.metallic.unwrap_or(0.0)),

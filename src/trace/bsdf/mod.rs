@@ -106,7 +106,10 @@ impl Bsdf {
                 wo: at.wo,
                 diffuse: base,
                 phong: match glossy {
-                    Glossy::BlinnPhong { specular, exponent } => Some((*specular, *exponent)),
+                    Glossy::BlinnPhong { specular, exponent, .. } => {
+                        let texel = scene.texture(surface.glossy_texture, at.uvs);
+                        Some((*specular * texel.truncate(), exponent * texel.w))
+                    }
                     _ => None,
                 },
                 mirror: material.mirror,
