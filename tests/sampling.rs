@@ -20,6 +20,7 @@ use penumbra::trace::film::Pixel;
 use penumbra::trace::light::FlatLight;
 use penumbra::trace::mesh_light::MeshLight;
 use penumbra::trace::noise::relative_error;
+use penumbra::trace::quad::Quad;
 use penumbra::trace::shape_light::{Shape, ShapeLight};
 use penumbra::trace::{Integrator, RenderSettings};
 use stage::{Estimate, Rng, Stage, quad, reds, settings};
@@ -34,7 +35,7 @@ fn shape(shape: Shape) -> ShapeLight {
 /// What a ray toward `wi` finds the density to be.
 fn hit_density(light: &ShapeLight, wi: Vec3) -> f64 {
     let ray = Ray::new(POINT, wi);
-    light.intersect(&ray).map_or(0.0, |hit| f64::from(light.emitted(&ray, &hit).1))
+    light.intersect(&ray).map_or(0.0, |hit| f64::from(light.pdf(&ray, Vec3::Z, &hit)))
 }
 
 fn light_sample(light: &FlatLight, rng: &mut Rng, density: &impl Fn(Vec3) -> f64) -> Option<Vec3> {
@@ -83,7 +84,7 @@ fn each_light_is_sampled_as_its_density_says() {
         let (a, b) = (p.cross(dv).dot(normal) * inverse, du.cross(p).dot(normal) * inverse);
         (a.clamp(0.0, 1.0), b.clamp(0.0, 1.0))
     };
-    let light = shape(Shape::Parallelogram { corner, u, v });
+    let light = shape(Shape::Parallelogram(Quad::new(corner, u, v)));
     let density = |wi: Vec3| hit_density(&light, wi);
     let flat = FlatLight::Shape(light.clone());
     sampler_against_density(

@@ -175,7 +175,7 @@ fn every_way_of_sampling_finds_the_same_light() {
             if let Some(sample) = bsdf.sample(rng.unit(), rng.pair(), Lobes::ALL) {
                 let ray = Ray::new(at.origin_toward(sample.wi), sample.wi);
                 if let Some(found) = scene.lights.closest(&ray) {
-                    bounce_sum += f64::from((sample.weight * found.shape.emitted(&ray, &found.hit).0).x);
+                    bounce_sum += f64::from((sample.weight * found.shape.emitted(&ray, &found.hit)).x);
                 }
             }
         }

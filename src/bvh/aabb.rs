@@ -63,4 +63,10 @@ impl Aabb {
     pub fn contains(&self, inner: &Self) -> bool {
         self.min.cmple(inner.min).all() && inner.max.cmple(self.max).all()
     }
+
+    /// Whether they have a point in common.
+    #[must_use]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
 }

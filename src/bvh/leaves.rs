@@ -80,6 +80,12 @@ impl Leaves {
         })
     }
 
+    /// The triangles of a leaf.
+    pub fn triangles(&self, first: usize, count: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        let rows = &self.rows[first * 9..(first + count) * 9];
+        (0..count).map(move |i| Self::corners(rows, count, i))
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.rows) + size_of_val(&*self.ids)
     }

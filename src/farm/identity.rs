@@ -56,9 +56,10 @@ impl Identity {
                 Some(Filter::Bilinear) => "bilinear".to_owned(),
             },
             sampling: format!(
-                "{:?}, {:?}",
+                "{:?}, {:?}{}",
                 settings.sampling,
-                settings.pixel_sampling.unwrap_or(settings.sampling)
+                settings.pixel_sampling.unwrap_or(settings.sampling),
+                if settings.shafts { "" } else { ", no shafts" }
             )
             .to_lowercase(),
             seed: settings.seed,

@@ -26,7 +26,7 @@ pub const OURS: &str = "ours";
 pub const RANDOM: &str = "random";
 
 /// All of them, in the order of the tables.
-pub const METHODS: [Method; 7] = [
+pub const METHODS: [Method; 8] = [
     Method {
         name: RANDOM,
         title: "plain random",
@@ -59,6 +59,14 @@ pub const METHODS: [Method; 7] = [
         ablation: true,
         adaptive: false,
         apply: |_| {},
+    },
+    Method {
+        name: "no-shafts",
+        title: "ours − shafts",
+        changes: "light that nothing can block is sampled too",
+        ablation: true,
+        adaptive: true,
+        apply: |settings| settings.shafts = false,
     },
     Method {
         name: "shifted",

@@ -34,15 +34,18 @@ pub struct TriangleMesh {
 
 impl TriangleMesh {
     /// Which of the instance's materials `triangle` wears.
+    #[inline]
     #[must_use]
     pub fn slot(&self, triangle: usize) -> usize {
         self.slots.get(triangle).map_or(0, |&slot| usize::from(slot))
     }
 
     /// The three corners of `triangle` in local space.
+    #[inline]
     #[must_use]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
-        self.triangles[triangle].map(|i| self.positions[i as usize])
+        let [a, b, c] = self.triangles[triangle];
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
     /// Adds a vertex that is in everything like `vertex`; returns its index.

@@ -5,6 +5,7 @@ use crate::scene::color::luminance;
 use crate::scene::{GlobalTransform, Light, Material, TriangleMesh, Visible};
 use crate::trace::light::FlatLight;
 use crate::trace::mesh_light::{MeshLight, triangle_area};
+use crate::trace::quad::Quad;
 use crate::trace::scene::InstanceData;
 use crate::trace::shape_light::{Shape, ShapeLight};
 use crate::trace::{Geometry, Lights, Surfaces};
@@ -88,7 +89,11 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
             // Double precision until the corner is known.
             let edge = |v: Vec3| placed.transform_vector3(v.as_dvec3());
             let corner = (placed.translation - (edge(edge_u) + edge(edge_v)) * 0.5).as_vec3();
-            solid(Shape::Parallelogram { corner, u: vector(edge_u), v: vector(edge_v) }, radiance, two_sided)
+            solid(
+                Shape::Parallelogram(Quad::new(corner, vector(edge_u), vector(edge_v))),
+                radiance,
+                two_sided,
+            )
         }
         Light::Disk { radius, radiance, two_sided } => {
             let scale = vector(Vec3::X).length();

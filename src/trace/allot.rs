@@ -5,77 +5,101 @@
 //! stays unbiased; a mean that ends when it looks good is not.
 
 use super::Film;
-use super::film::TILE;
 use crate::scene::color::luminance;
+use glam::DVec3;
 
 /// Even samples per pixel before shares are given out.
-pub const EVEN: u32 = 8;
+pub const EVEN: u32 = 4;
 /// Nobody gets less than this share, or more than that many: what the first samples have missed must have its
 /// chance.
-const LEAST: f64 = 0.25;
-const MOST: f64 = 24.0;
+const LEAST: f64 = 0.05;
+const MOST: f64 = 200.0;
 /// What is so many times as bright as half of the picture may have larger errors: they are seen no better, and a
 /// lamp's edge would get all samples.
 const BRIGHT: f64 = 10.0;
 
 /// Shares for [`Film::allot`]: where n samples leave an error of σ/n^a, with a = 0.75 for scrambled nets on
-/// penumbrae, the mean squared error is least with n in proportion to σ^(1/(a + ½)).
+/// penumbrae and edges, the mean squared error is least with n in proportion to σ^(1/(a + ½)).
 ///
 /// Half the difference of the two halves stands for the error. A pixel that lacks one (all its samples may have
 /// been dropped) says nothing.
 #[must_use]
-pub fn shares(film: &Film) -> Vec<[f32; 2]> {
-    by_color(film, 1).into_iter().zip(by_color(film, 0)).map(|(a, b)| [a, b]).collect()
-}
-
-/// A share for each tile, from its pixels of one colour.
-fn by_color(film: &Film, color: usize) -> Vec<f32> {
-    let (mut variances, mut brightness) = (Vec::new(), Vec::new());
-    for tile in film.tiles() {
-        let (mut sum, mut light, mut count) = (0.0, 0.0, 0.0);
-        for (i, pixel) in (0..).zip(tile.pixels()) {
-            if tile.color(i) == color
-                && let Some((a, b)) = pixel.half_mean(0).zip(pixel.half_mean(1))
-            {
-                sum += (a - b).length_squared();
-                light += f64::from(luminance(pixel.mean().as_vec3()));
-                count += 1.0;
+pub fn shares(film: &Film) -> Vec<f32> {
+    let [width, height] = film.size().to_array().map(|n| n as usize);
+    let mut variances = vec![0.0; width * height];
+    let mut means = vec![DVec3::ZERO; width * height];
+    for y in 0..height {
+        for (x, pixel) in film.row(y as u32).enumerate() {
+            if let Some((a, b)) = pixel.half_mean(0).zip(pixel.half_mean(1)) {
+                variances[y * width + x] = (a - b).length_squared();
+                means[y * width + x] = pixel.mean();
             }
         }
-        // A tile of one pixel has no other colour.
-        variances.push(sum / f64::max(count, 1.0));
-        brightness.push(light / f64::max(count, 1.0));
     }
+    let brightness: Vec<f64> = means.iter().map(|mean| f64::from(luminance(mean.as_vec3()))).collect();
     let mut sorted = brightness.clone();
     let middle = sorted.len() / 2;
     let bright = BRIGHT * *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
     if bright > 0.0 {
-        for (variance, light) in variances.iter_mut().zip(&brightness) {
-            *variance /= (light / bright).powi(2) + 1.0;
+        for ((variance, mean), light) in variances.iter_mut().zip(&mut means).zip(&brightness) {
+            let dimmed = (light / bright).powi(2) + 1.0;
+            *variance /= dimmed;
+            *mean /= dimmed.sqrt();
         }
     }
-    let across = film.size().x.div_ceil(TILE) as usize;
-    let rows = variances.len() / across;
-    let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
-    let wanted = |i: usize| {
-        let (x, y) = (i % across, i / across);
-        let around = near(y, rows).flat_map(|y| near(x, across).map(move |x| y * across + x));
-        // Neighbours count little: they are there for what few samples have missed.
-        around.map(|k| variances[k] * if k == i { 1.0 } else { 0.02 }).sum::<f64>().powf(0.4)
-    };
-    let wanted: Vec<f64> = (0..variances.len()).map(wanted).collect();
-    let mean = mean(film, &wanted);
-    if !(mean > 0.0 && mean.is_finite()) {
+    let wanted: Vec<f64> = (0..width * height)
+        .map(|i| {
+            let (x, y) = ((i % width) as i64, (i / width) as i64);
+            let (mut sum, mut weights) = (0.0, 0.0);
+            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            for (dx, dy, weight) in AROUND {
+                let (x, y) = (x + dx, y + dy);
+                if (0..width as i64).contains(&x) && (0..height as i64).contains(&y) {
+                    let other = y as usize * width + x as usize;
+                    sum += weight * variances[other];
+                    weights += weight;
+                    if weight == 1.0 {
+                        (low, high) = (low.min(means[other]), high.max(means[other]));
+                    }
+                }
+            }
+            // A picture of one pixel has no others.
+            if weights == 0.0 {
+                return 1.0;
+            }
+            (sum / weights + EDGE * (high - low).length_squared()).powf(0.4)
+        })
+        .collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let average = mean(&wanted);
+    if !(average > 0.0 && average.is_finite()) {
         return vec![1.0; wanted.len()];
     }
-    let clamped: Vec<f64> = wanted.iter().map(|w| (w / mean).clamp(LEAST, MOST)).collect();
-    let mean = self::mean(film, &clamped);
-    clamped.iter().map(|w| (w / mean) as f32).collect()
+    let clamped: Vec<f64> = wanted.iter().map(|w| (w / average).clamp(LEAST, MOST)).collect();
+    let average = mean(&clamped);
+    clamped.iter().map(|w| (w / average) as f32).collect()
 }
 
-/// Over all pixels, of what each tile has.
-fn mean(film: &Film, values: &[f64]) -> f64 {
-    let weighted = film.tiles().iter().zip(values);
-    let sum: f64 = weighted.map(|(t, v)| v * f64::from(t.size.element_product())).sum();
-    sum / f64::from(film.size().element_product())
-}
+/// Pixels of the other colour, near ones and, for what few samples have missed, some farther ones; and what each counts.
+const AROUND: [(i64, i64, f64); 16] = [
+    (-1, 0, 1.0),
+    (1, 0, 1.0),
+    (0, -1, 1.0),
+    (0, 1, 1.0),
+    (-3, 0, FAR),
+    (3, 0, FAR),
+    (0, -3, FAR),
+    (0, 3, FAR),
+    (-2, -1, FAR),
+    (-2, 1, FAR),
+    (2, -1, FAR),
+    (2, 1, FAR),
+    (-1, -2, FAR),
+    (-1, 2, FAR),
+    (1, -2, FAR),
+    (1, 2, FAR),
+];
+const FAR: f64 = 0.01;
+/// What a step between two neighbours counts, squared: an edge goes through the pixel, perhaps just so that all halves
+/// agree (a net has as many samples on either side of its middle).
+const EDGE: f64 = 0.02;

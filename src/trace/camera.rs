@@ -1,6 +1,9 @@
 //! Pixels → rays.
 
+use super::block::{LANES, Row, Rows};
+use super::sampler::SamplerRow;
 use crate::bvh::Ray;
+use crate::bvh::simd::{Job, Simd};
 use crate::scene::Projection;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DVec3, UVec2, Vec2, Vec3};
@@ -61,6 +64,7 @@ impl Viewpoint {
     }
 
     /// The ray through `point`, in pixels from the top left of a picture of `size`; unit direction.
+    #[inline(always)]
     #[must_use]
     pub fn ray(&self, point: Vec2, size: UVec2) -> Ray {
         let size = size.as_vec2();
@@ -69,9 +73,40 @@ impl Viewpoint {
         let y = 1.0 - 2.0 * point.y / size.y;
         let offset = (self.right * x + self.up * y) * self.half_height;
         if self.perspective {
-            Ray::new(self.origin, (offset - self.back).normalize())
+            let along = offset - self.back;
+            Ray::new(self.origin, along * (1.0 / along.length()))
         } else {
             Ray::new(self.origin + offset, -self.back)
+        }
+    }
+}
+
+/// Rays through the pixels with these top left `corners`, each at a place of its own in the pixel.
+pub(super) struct Look<'a> {
+    pub viewpoint: &'a Viewpoint,
+    pub size: UVec2,
+    pub samplers: &'a SamplerRow<LANES>,
+    pub corners: [&'a Row; 2],
+    /// What comes out; no more than a row.
+    pub rays: &'a mut [Ray],
+}
+
+impl Job for Look<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+        self.samplers.pairs(0, &mut x, &mut y);
+        let (mut origins, mut directions) = (Rows::blank(), Rows::blank());
+        for i in 0..LANES {
+            let point = Vec2::new(self.corners[0][i] + x[i], self.corners[1][i] + y[i]);
+            let ray = self.viewpoint.ray(point, self.size);
+            origins.set(i, ray.origin);
+            directions.set(i, ray.direction);
+        }
+        for (i, ray) in self.rays.iter_mut().enumerate() {
+            *ray = Ray::new(origins.get(i), directions.get(i));
         }
     }
 }

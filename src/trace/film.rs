@@ -5,6 +5,7 @@
 //! (an f32 sum of ones stops at 2²⁴). Even samples go to one half, odd samples to the other;
 //! the halves are scrambled independently, so their difference measures the error of their mean.
 
+use super::sightlines::Sightlines;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2, Vec3};
 
@@ -22,7 +23,21 @@ impl Sum {
     const FRACTION_BITS: i32 = 60;
     const LIMIT: f32 = (1u64 << 35) as f32;
 
+    #[inline]
     fn add(&mut self, sample: f32) {
+        if sample.abs() < 4.0 {
+            // A product with a power of two is exact, and what has digits to round is far below 2⁵³.
+            let scaled = f64::from(sample) * (1u64 << Self::FRACTION_BITS) as f64;
+            let magnitude = (scaled.abs() + 0.5) as i64;
+            self.0 += i128::from(if scaled < 0.0 { -magnitude } else { magnitude });
+        } else {
+            self.add_any(sample);
+        }
+    }
+
+    /// For all magnitudes.
+    #[cold]
+    fn add_any(&mut self, sample: f32) {
         let bits = sample.to_bits();
         let exponent = (bits >> 23 & 0xff) as i32;
         let mantissa = i128::from(bits & 0x7f_ffff) | i128::from(exponent != 0) << 23;
@@ -53,6 +68,7 @@ pub struct Pixel {
 impl Pixel {
     /// Adds the linear RGB `radiance` of sample number `index`. False if it was dropped since it is
     /// not finite, or below −2³⁵ or above 2³⁵, where no sum of light should be.
+    #[inline]
     pub fn add(&mut self, index: u32, radiance: Vec3) -> bool {
         // Not `any(> limit)`: a NaN must fail too.
         if !radiance.to_array().iter().all(|c| c.abs() < Sum::LIMIT) {
@@ -64,6 +80,16 @@ impl Pixel {
         }
         self.counts[half] += 1;
         true
+    }
+
+    /// [`Pixel::add`] of many; returns how many were dropped.
+    pub fn add_all(&mut self, samples: impl Iterator<Item = (u32, Vec3)>) -> u64 {
+        let (mut all, mut dropped) = (*self, 0);
+        for (index, radiance) in samples {
+            dropped += u64::from(!all.add(index, radiance));
+        }
+        *self = all;
+        dropped
     }
 
     /// Mean radiance of all samples; black without any.
@@ -130,22 +156,27 @@ pub struct Tile {
     pub size: UVec2,
     /// Index of the sample that comes next in each of its pixels, but for `more`.
     pub next_sample: u32,
-    /// Samples beyond `next_sample` that the pixels of either colour have (see [`Film::allot`]).
-    pub more: [u32; 2],
-    /// How many they get for each one that the picture gets on average.
-    shares: [f32; 2],
+    /// Samples beyond `next_sample` that each pixel has, in rows from the top. Empty before [`Film::allot`].
+    pub(super) more: Vec<u32>,
+    /// How many each gets for each one that the picture gets on average; as many.
+    shares: Vec<f32>,
+    /// Samples per pixel of the picture that all have their share of, if they have shares.
+    pub(super) complete: u32,
     /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
     pub dropped: u64,
     /// What the pixels hold is from before the last reset.
     stale: bool,
+    /// What is known of its part of the scene until the next reset.
+    pub(super) sightlines: Sightlines,
     pixels: Vec<Pixel>,
 }
 
 impl Tile {
-    /// Pixels are coloured as a chess board; the first of a tile has colour 0.
+    /// What [`Tile::more`] is to be of a pixel when it has its share of `beyond` samples.
     #[must_use]
-    pub fn color(&self, pixel: u32) -> usize {
-        ((pixel % self.size.x + pixel / self.size.x) & 1) as usize
+    pub(super) fn goal(&self, pixel: usize, beyond: u32) -> u32 {
+        // Saturates.
+        (f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32
     }
 
     /// Rows from the top, to look at.
@@ -189,10 +220,12 @@ impl Film {
                     origin,
                     size,
                     next_sample: first_sample,
-                    more: [0; 2],
-                    shares: [1.0; 2],
+                    more: Vec::new(),
+                    shares: Vec::new(),
+                    complete: 0,
                     dropped: 0,
                     stale: false,
+                    sightlines: Sightlines::default(),
                     pixels,
                 }
             })
@@ -206,9 +239,11 @@ impl Film {
         self.even_samples = 0;
         for tile in &mut self.tiles {
             tile.next_sample = first_sample;
-            (tile.more, tile.shares) = ([0; 2], [1.0; 2]);
+            tile.more.clear();
+            tile.shares.clear();
             tile.dropped = 0;
             tile.stale = true;
+            tile.sightlines = Sightlines::default();
         }
     }
 
@@ -277,15 +312,22 @@ impl Film {
         })
     }
 
-    /// From now on gives the pixels of each tile and colour their own `shares` of all samples, of mean 1. Every
-    /// pixel must have the same number of samples, one at least.
+    /// From now on gives each pixel its own share of all samples, of mean 1; `shares` are in rows of the whole picture.
+    /// Every pixel must have the same number of samples, one at least.
     ///
     /// A picture stays unbiased only if how many samples a pixel gets does not depend on what they say: so
-    /// the share of one colour is to be found from pixels of the other.
-    pub fn allot(&mut self, shares: &[[f32; 2]]) {
+    /// the share of one pixel is to be found from others.
+    pub fn allot(&mut self, shares: &[f32]) {
         self.even_samples = self.complete_samples();
-        for (tile, &shares) in self.tiles.iter_mut().zip(shares) {
-            tile.shares = shares;
+        let across = self.size.x as usize;
+        for tile in &mut self.tiles {
+            let [x, y, width, height] =
+                [tile.origin.x, tile.origin.y, tile.size.x, tile.size.y].map(|n| n as usize);
+            tile.shares.clear();
+            tile.shares.extend((y..y + height).flat_map(|y| &shares[y * across + x..][..width]));
+            tile.more.clear();
+            tile.more.resize(width * height, 0);
+            tile.complete = self.even_samples;
         }
     }
 
@@ -295,44 +337,59 @@ impl Film {
         self.even_samples > 0
     }
 
-    /// What [`Tile::more`] is when the tile has its share of `samples` per pixel.
+    /// Samples that each pixel had before [`Film::allot`]; 0 without it.
     #[must_use]
-    pub fn goal(&self, tile: &Tile, samples: u32) -> [u32; 2] {
-        let beyond = f64::from(samples.saturating_sub(self.even_samples));
-        // Saturates.
-        tile.shares.map(|share| (beyond * f64::from(share)).ceil() as u32)
+    pub fn even_samples(&self) -> u32 {
+        self.even_samples
     }
 
     /// Samples that every pixel has its share of.
     #[must_use]
     pub fn complete_samples(&self) -> u32 {
-        let even = self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample;
-        if !self.is_allotted() {
-            return even;
+        if self.is_allotted() {
+            return self.tiles.iter().map(|t| t.complete).min().unwrap_or(0);
         }
-        // Shares are rounded up to whole samples; what is missing is rounding of the division.
-        let beyond = |t: &Tile, color: usize| f64::from(t.more[color]) / f64::from(t.shares[color]) + 1e-6;
-        let least = self.tiles.iter().map(|t| beyond(t, 0).min(beyond(t, 1)));
-        even + least.fold(f64::INFINITY, f64::min) as u32
+        self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample
     }
 
     /// Samples a pixel has on average.
     #[must_use]
     pub fn mean_samples(&self) -> f64 {
-        let sum: f64 = self
-            .tiles
-            .iter()
-            .map(|t| {
-                let more = 0.5 * (f64::from(t.more[0]) + f64::from(t.more[1]));
-                (f64::from(t.next_sample - self.first_sample) + more) * f64::from(t.size.element_product())
-            })
-            .sum();
-        sum / f64::from(self.size.element_product())
+        let of = |t: &Tile| {
+            let even = u64::from(t.next_sample - self.first_sample) * u64::from(t.size.element_product());
+            even + t.more.iter().map(|&n| u64::from(n)).sum::<u64>()
+        };
+        self.tiles.iter().map(of).sum::<u64>() as f64 / f64::from(self.size.element_product())
     }
 
     /// Samples dropped because they were not finite.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.tiles.iter().map(|t| t.dropped).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_samples_are_added_as_all_are() {
+        let (mut quick, mut slow) = (Sum::default(), Sum::default());
+        let mut bits = 1_u32;
+        for _ in 0..1_000_000 {
+            bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let sample = f32::from_bits(bits);
+            if sample.abs() < 4.0 {
+                quick.add(sample);
+                slow.add_any(sample);
+                assert_eq!(quick, slow, "{sample:e}");
+            }
+        }
+        for sample in [1.5 * 2f32.powi(-60), 0.5 * 2f32.powi(-60), -0.5 * 2f32.powi(-60), 4f32.next_down()] {
+            quick.add(sample);
+            slow.add_any(sample);
+            assert_eq!(quick, slow, "{sample:e}");
+        }
     }
 }

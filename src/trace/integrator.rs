@@ -4,154 +4,231 @@
 //! shadows, keep the paths that go on. The result for a sample is a function of its
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
+use super::block::LANES;
 use super::bsdf::{Bsdf, Evaluated, Lobes};
+use super::camera::Look;
+use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::{FlatLight, LightSample};
 use super::pass::RayCounts;
-use super::sampler::Sampler;
+use super::sampler::{Sampler, SamplerRow};
 use super::scene::Surface;
 use super::surface::Interaction;
 use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 /// One path under way.
 #[derive(Clone, Copy, Debug)]
-struct Path {
+pub(super) struct Path {
     /// Which entry of the batch it adds to.
-    entry: u32,
-    sampler: Sampler,
-    ray: Ray,
+    pub(super) entry: u32,
+    pub(super) sampler: Sampler,
+    pub(super) ray: Ray,
     /// What light at the ray's end is worth at the eye.
-    throughput: Vec3,
-    depth: u32,
+    pub(super) throughput: Vec3,
+    pub(super) depth: u32,
     /// How the last bounce chose the ray's direction; `None`: no light sample could have found it.
-    bounce: Option<Bounce>,
+    pub(super) bounce: Option<Bounce>,
     /// Only collects what shines at its end.
-    last: bool,
+    pub(super) last: bool,
     /// Absorption coefficient of the body that the ray crosses; zero outside.
-    absorption: Vec3,
+    pub(super) absorption: Vec3,
 }
 
 /// The smooth bounce that a ray comes from.
 #[derive(Clone, Copy, Debug)]
-struct Bounce {
-    pdf: f32,
-    normal: Vec3,
+pub(super) struct Bounce {
+    pub(super) pdf: f32,
+    pub(super) normal: Vec3,
+    /// Lights that have been counted in full where it comes from, a bit for each.
+    pub(super) counted: u32,
 }
 
 /// A ray toward a light, and what it brings if nothing is in the way.
 #[derive(Clone, Copy, Debug)]
-struct Shadow {
-    entry: u32,
-    sampler: Sampler,
-    ray: Ray,
-    light: u32,
-    triangle: Option<(u32, u32)>,
-    contribution: Vec3,
-    key: u32,
+pub(super) struct Shadow {
+    pub(super) entry: u32,
+    pub(super) sampler: Sampler,
+    pub(super) ray: Ray,
+    pub(super) light: u32,
+    pub(super) triangle: Option<(u32, u32)>,
+    pub(super) contribution: Vec3,
+    pub(super) key: u32,
 }
+
+/// Which samples a tile is to get.
+#[derive(Clone, Copy, Debug)]
+pub enum Work {
+    /// All pixels those below index `until`.
+    Even {
+        /// The first that is not to be taken.
+        until: u32,
+    },
+    /// Each pixel its share.
+    Shares {
+        /// Samples per pixel of the picture beyond the even ones.
+        beyond: u32,
+    },
+}
+
+impl Default for Work {
+    fn default() -> Self {
+        Self::Even { until: 0 }
+    }
+}
+
+/// Samples that are followed together: more would only need more memory (a thread's buffers take about 1 MB).
+const TOGETHER: u32 = 2048;
 
 /// Buffers of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Batch {
-    pixels: Vec<(u32, UVec2, [Sampler; 2])>,
-    paths: Vec<Path>,
-    next: Vec<Path>,
-    shadows: Vec<Shadow>,
-    rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
+    /// Top left corners and samplers of the tile's pixels.
+    pixels: Vec<(Vec2, [Sampler; 2])>,
+    work: Work,
+    pub(super) paths: Vec<Path>,
+    pub(super) next: Vec<Path>,
+    pub(super) shadows: Vec<Shadow>,
+    pub(super) diffuse: Diffuse,
+    pub(super) rays: Vec<Ray>,
+    pub(super) hits: Vec<Option<Hit>>,
     ignored: Vec<Option<(u32, u32)>>,
     blocked: Vec<bool>,
-    radiance: Vec<Vec3>,
+    pub(super) radiance: Vec<Vec3>,
+    /// Which of `pixels`, and which sample: all of one pixel, then of the next.
     keys: Vec<(u32, u32)>,
 }
 
 /// Dimensions of the sampler: pair 0 is the place in the pixel, then this many pairs a bounce.
-const PAIRS_PER_BOUNCE: u32 = 32;
-const LOBE: u32 = 1;
-const DIRECTION: u32 = 2;
-const PICK: u32 = 3;
-const LIGHT: u32 = 4;
+pub(super) const PAIRS_PER_BOUNCE: u32 = 32;
+pub(super) const LOBE: u32 = 1;
+pub(super) const DIRECTION: u32 = 2;
+pub(super) const PICK: u32 = 3;
+pub(super) const LIGHT: u32 = 4;
 /// From this depth on a path may end by chance.
-const ROULETTE_DEPTH: u32 = 4;
+pub(super) const ROULETTE_DEPTH: u32 = 4;
 
 impl Batch {
-    /// Adds the next `count` samples to each pixel of `tile`, or to those of one colour, for a picture of `size`.
-    pub fn render(
-        &mut self,
-        scene: &TraceScene,
-        tile: &mut Tile,
-        size: UVec2,
-        color: Option<usize>,
-        count: u32,
-        rays: &mut RayCounts,
-    ) {
-        let first = tile.next_sample + color.map_or(0, |color| tile.more[color]);
-        self.paths.clear();
+    /// Notes which samples of `tile` come next, as many as are followed together. False if there is none.
+    pub fn begin(&mut self, scene: &TraceScene, tile: &Tile, work: Work) -> bool {
         self.keys.clear();
-        let members =
-            (0..tile.size.element_product()).filter(|&i| color.is_none_or(|color| tile.color(i) == color));
-        self.pixels.clear();
-        self.pixels.extend(members.map(|i| {
-            let pixel = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
-            (i, pixel, Sampler::halves(pixel, scene.settings))
-        }));
-        for sample in first..first + count {
-            for &(i, pixel, halves) in &self.pixels {
-                let sampler = halves[sample as usize & 1].at(sample);
-                let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), size);
-                let entry = self.keys.len() as u32;
-                self.keys.push((i, sample));
-                let throughput = Vec3::ONE;
-                self.paths.push(Path {
-                    entry,
-                    sampler,
-                    ray,
-                    throughput,
-                    depth: 0,
-                    bounce: None,
-                    last: false,
-                    absorption: Vec3::ZERO,
-                });
+        self.work = work;
+        let pixels = tile.size.element_product();
+        match work {
+            Work::Even { until } => {
+                let first = tile.next_sample;
+                let count = until.saturating_sub(first).min((TOGETHER / pixels).max(1));
+                self.keys
+                    .extend((0..pixels).flat_map(|i| (first..first + count).map(move |sample| (i, sample))));
+            }
+            Work::Shares { beyond } => {
+                for (i, &more) in (0..pixels).zip(&tile.more) {
+                    let room = TOGETHER - self.keys.len() as u32;
+                    let count = tile.goal(i as usize, beyond).saturating_sub(more).min(room);
+                    let first = tile.next_sample + more;
+                    self.keys.extend((first..first + count).map(|sample| (i, sample)));
+                }
             }
         }
+        if self.keys.is_empty() {
+            return false;
+        }
+        self.pixels.clear();
+        Sampler::tile(tile.origin, tile.size, scene.settings, |halves| {
+            let i = self.pixels.len() as u32;
+            let corner = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
+            self.pixels.push((corner.as_vec2(), halves));
+        });
+        true
+    }
+
+    /// Adds the samples that [`Batch::begin`] has noted, of a picture of `size`.
+    pub fn render(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2, rays: &mut RayCounts) {
+        self.diffuse.enter(scene, tile, size);
+        self.look(scene, size);
         self.radiance.clear();
         self.radiance.resize(self.keys.len(), Vec3::ZERO);
-        rays.camera += self.paths.len() as u64;
+        rays.camera += self.rays.len() as u64;
+        self.paths.clear();
+        self.wave(scene, rays);
         while !self.paths.is_empty() {
+            self.rays.clear();
+            self.rays.extend(self.paths.iter().map(|path| path.ray));
             self.wave(scene, rays);
         }
+        self.diffuse.leave(tile);
         let mut dropped = 0;
         let pixels = tile.pixels_mut();
-        for (&(pixel, sample), &radiance) in self.keys.iter().zip(&self.radiance) {
-            dropped += u64::from(!pixels[pixel as usize].add(sample, radiance));
+        let mut done = 0;
+        for run in self.keys.chunk_by(|a, b| a.0 == b.0) {
+            let samples = run.iter().zip(&self.radiance[done..]).map(|(key, radiance)| (key.1, *radiance));
+            dropped += pixels[run[0].0 as usize].add_all(samples);
+            done += run.len();
         }
         tile.dropped += dropped;
-        match color {
-            None => tile.next_sample += count,
-            Some(color) => tile.more[color] += count,
+        match self.work {
+            Work::Even { .. } => tile.next_sample += (self.keys.len() / self.pixels.len()) as u32,
+            Work::Shares { .. } => {
+                for key in &self.keys {
+                    tile.more[key.0 as usize] += 1;
+                }
+            }
         }
     }
 
+    /// Makes the camera rays.
+    fn look(&mut self, scene: &TraceScene, size: UVec2) {
+        self.rays.clear();
+        self.rays.resize(self.keys.len(), Ray::new(Vec3::ZERO, Vec3::Z));
+        for (keys, rays) in self.keys.chunks(LANES).zip(self.rays.chunks_mut(LANES)) {
+            let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+            let mut samplers = SamplerRow::new(self.pixels[keys[0].0 as usize].1[0]);
+            for (i, &(pixel, sample)) in keys.iter().enumerate() {
+                let (corner, halves) = &self.pixels[pixel as usize];
+                (x[i], y[i]) = (corner.x, corner.y);
+                samplers.set(i, &halves[sample as usize & 1].at(sample));
+            }
+            let (viewpoint, samplers) = (scene.viewpoint, &samplers);
+            scene.geometry.tlas.isa().run(Look { viewpoint, size, samplers, corners: [&x, &y], rays });
+        }
+    }
+
+    /// Path number `index` of this wave. Those of the first one are as they begin.
+    #[inline]
+    pub(super) fn path(&self, index: usize) -> Path {
+        if let Some(path) = self.paths.get(index) {
+            return *path;
+        }
+        let (pixel, sample) = self.keys[index];
+        Path {
+            entry: index as u32,
+            sampler: self.pixels[pixel as usize].1[sample as usize & 1].at(sample),
+            ray: self.rays[index],
+            throughput: Vec3::ONE,
+            depth: 0,
+            bounce: None,
+            last: false,
+            absorption: Vec3::ZERO,
+        }
+    }
+
+    /// Follows `rays`, which are those of `paths`; in the first wave there are none yet.
     fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
         self.next.clear();
         self.shadows.clear();
-        self.rays.clear();
-        self.rays.extend(self.paths.iter().map(|path| path.ray));
-        self.hits.resize(self.rays.len(), None);
-        let paths = &self.paths;
-        let random = |i: usize, key: u32| paths[i].sampler.hashed(key ^ paths[i].depth);
-        scene.closest_hits(&self.rays, &mut self.hits, random);
-        for i in 0..self.paths.len() {
-            let mut path = self.paths[i];
-            if path.absorption != Vec3::ZERO
-                && let Some(hit) = self.hits[i]
-            {
-                path.throughput *= passed(path.absorption, hit.t * path.ray.direction.length());
-            }
-            self.arrive(scene, &path, self.hits[i]);
+        let mut hits = std::mem::take(&mut self.hits);
+        hits.resize(self.rays.len(), None);
+        let random = |i: usize, key: u32| {
+            let path = self.path(i);
+            path.sampler.hashed(key ^ path.depth)
+        };
+        scene.closest_hits(&self.rays, &mut hits, random);
+        self.hits = hits;
+        for i in 0..self.rays.len() {
+            self.arrive(scene, i);
         }
+        self.shade_diffuse(scene);
         rays.shadow += self.connect_lights(scene);
         rays.bounce += self.next.len() as u64;
         std::mem::swap(&mut self.paths, &mut self.next);
@@ -179,10 +256,17 @@ impl Batch {
     }
 
     /// What the end of a path's ray sends back along it, and where it goes on.
-    fn arrive(&mut self, scene: &TraceScene, path: &Path, hit: Option<Hit>) {
+    fn arrive(&mut self, scene: &TraceScene, index: usize) {
+        let (mut path, hit) = (self.path(index), self.hits[index]);
+        if let (true, Some(hit)) = (path.absorption != Vec3::ZERO, hit) {
+            path.throughput *= passed(path.absorption, hit.t * path.ray.direction.length());
+        }
+        let path = &path;
         let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
-        if let Some(found) = scene.lights.closest(&before_hit) {
-            let (radiance, pdf) = found.shape.emitted(&path.ray, &found.hit);
+        let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
+        if let Some(found) = may_meet.then(|| scene.lights.closest(&before_hit)).flatten() {
+            let radiance = found.shape.emitted(&path.ray, &found.hit);
+            let pdf = path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.normal, &found.hit));
             self.collect(scene, path, found.light, radiance, pdf);
             return;
         }
@@ -196,6 +280,13 @@ impl Batch {
             return;
         };
         let (instance, surface) = scene.surface_at(&hit);
+        // Inside a body even the way from a light counts.
+        if surface.is_diffuse() && path.absorption == Vec3::ZERO {
+            if !path.last && path.depth < scene.settings.max_depth {
+                self.diffuse.add(scene, index, &hit, path.depth);
+            }
+            return;
+        }
         let at = Interaction::new(scene, instance, &hit, &path.ray);
         if surface.material.unlit {
             let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
@@ -227,6 +318,9 @@ impl Batch {
     /// Adds light that a ray ran into, weighted against the chance of having sampled it.
     fn collect(&mut self, scene: &TraceScene, path: &Path, light: u32, radiance: Vec3, pdf: f32) {
         let weight = path.bounce.map_or(1.0, |bounce| {
+            if light < u32::BITS && bounce.counted >> light & 1 == 1 {
+                return 0.0;
+            }
             let light_pdf = pdf * scene.lights.chance(path.depth - 1, light);
             power_heuristic(bounce.pdf, light_pdf)
         });
@@ -285,7 +379,7 @@ impl Batch {
             ray: Ray::new(at.origin_toward(sample.wi), sample.wi),
             throughput,
             depth: path.depth + 1,
-            bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal() }),
+            bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal(), counted: 0 }),
             last: !sample.follow && scene.settings.integrator == Integrator::Direct,
             absorption,
         });
@@ -354,7 +448,7 @@ fn passed(absorption: Vec3, distance: f32) -> Vec3 {
 }
 
 /// Radiance of an emissive triangle at a sampled point.
-fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
+pub(super) fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
     let hit = Hit { t: 0.0, u: sample.uv.x, v: sample.uv.y, triangle, instance };
     let (data, surface) = scene.surface_at(&hit);
     let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
@@ -366,7 +460,7 @@ fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &Ligh
 /// Weight of a sample of density `a` that might have been taken with density `b`.
 ///
 /// Reference: E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2.2.
-fn power_heuristic(a: f32, b: f32) -> f32 {
+pub(super) fn power_heuristic(a: f32, b: f32) -> f32 {
     // As a ratio: squares of large densities overflow.
     let ratio = b / a;
     1.0 / (1.0 + ratio * ratio)

@@ -125,7 +125,7 @@ impl FlatLight {
                 let strength = strength[0].lerp(strength[1], u.x);
                 Some(LightSample::new(wi, Some(position), strength * (sine * length / distance2), None))
             }
-            Self::Shape(light) => light.sample(point, u),
+            Self::Shape(light) => light.sample(point, normal, u),
             Self::Mesh(light) => light.sample(point, u),
             Self::Environment { radiance } => {
                 let local = cosine_hemisphere(u);
@@ -197,6 +197,7 @@ pub(super) fn sample_flat(
 }
 
 /// Bound on the rounding error of a point computed on a light.
+#[inline(always)]
 pub(super) fn error_of(position: Vec3) -> Vec3 {
     position.abs() * (8.0 / (1 << 24) as f32)
 }

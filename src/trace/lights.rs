@@ -2,7 +2,7 @@
 
 use super::light::FlatLight;
 use super::shape_light::{ShapeHit, ShapeLight};
-use crate::bvh::{Aabb, Bvh, Probe, Ray};
+use crate::bvh::{Aabb, Bvh, Probe, Ray, Shaft};
 use bevy_ecs::prelude::*;
 use std::ops::ControlFlow;
 
@@ -164,6 +164,24 @@ impl Lights {
             }
         })
         .is_break()
+    }
+
+    /// Whether surely no solid shape other than light number `except` is in the way within `shaft`.
+    #[must_use]
+    pub fn is_clear(&self, shaft: &Shaft, except: u32) -> bool {
+        self.shape_lights.iter().all(|&light| match self.get(light) {
+            FlatLight::Shape(shape) if light != except => shaft.misses_box(&shape.shape.bounds()),
+            _ => true,
+        })
+    }
+
+    /// Whether one of the boxes around solid shapes is such a one.
+    #[must_use]
+    pub fn any_shape(&self, is: impl Fn(Aabb) -> bool) -> bool {
+        self.shape_lights.iter().any(|&light| match self.get(light) {
+            FlatLight::Shape(shape) => is(shape.shape.bounds()),
+            _ => false,
+        })
     }
 
     fn shapes_on<'a, B>(

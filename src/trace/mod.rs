@@ -4,9 +4,11 @@
 //! a tile together, wave by wave, through [`TraceScene`].
 
 pub mod allot;
+pub mod block;
 pub mod bsdf;
 pub mod camera;
 pub mod convergence;
+mod diffuse;
 pub mod film;
 pub mod integrator;
 pub mod light;
@@ -14,12 +16,15 @@ pub mod lights;
 pub mod mesh_light;
 pub mod noise;
 pub mod pass;
+pub mod quad;
 pub mod sampler;
 pub mod scene;
 pub mod settings;
 pub mod shape_light;
+mod sightlines;
 pub mod surface;
 pub mod texture;
+pub mod visible;
 pub mod warp;
 
 pub use camera::Viewpoint;

@@ -1,6 +1,6 @@
 //! Tiles over threads.
 
-use super::integrator::Batch;
+use super::integrator::{Batch, Work};
 use super::{Film, TraceScene, allot};
 use rayon::prelude::*;
 
@@ -34,10 +34,6 @@ impl std::ops::Add for RayCounts {
     }
 }
 
-/// Samples per pixel that are followed together: more would only need more memory (at 32 and 16 × 16
-/// pixels a thread's buffers take about 2 MB).
-const BATCH_SAMPLES: u32 = 32;
-
 /// As [`trace_pass`], but after some even samples more go where there is more noise.
 pub fn trace_adaptive(
     scene: &TraceScene,
@@ -70,25 +66,26 @@ pub fn trace_pass(
 ) -> RayCounts {
     let size = film.size();
     let samples = film.complete_samples().saturating_add(step.max(1)).min(until);
-    let even = (!film.is_allotted()).then(|| film.first_sample().saturating_add(samples));
-    let goals: Vec<[u32; 2]> = film.tiles().iter().map(|tile| film.goal(tile, samples)).collect();
+    let (allotted, first) = (film.is_allotted(), film.first_sample());
+    let beyond = samples.saturating_sub(film.even_samples());
     film.tiles_mut()
         .par_iter_mut()
-        .zip(goals)
-        .map_init(Batch::default, |batch, (tile, goals)| {
+        .map_init(Batch::default, |batch, tile| {
             let mut rays = RayCounts::default();
-            if let Some(goal) = even {
-                while tile.next_sample < goal && keep_going() {
-                    let count = (goal - tile.next_sample).min(BATCH_SAMPLES);
-                    batch.render(scene, tile, size, None, count, &mut rays);
+            loop {
+                let work = if allotted {
+                    Work::Shares { beyond }
+                } else {
+                    Work::Even { until: first.saturating_add(samples) }
+                };
+                if !batch.begin(scene, tile, work) {
+                    tile.complete = samples;
+                    break;
                 }
-                return rays;
-            }
-            for (color, goal) in goals.into_iter().enumerate() {
-                while tile.more[color] < goal && keep_going() {
-                    let count = (goal - tile.more[color]).min(BATCH_SAMPLES);
-                    batch.render(scene, tile, size, Some(color), count, &mut rays);
+                if !keep_going() {
+                    break;
                 }
+                batch.render(scene, tile, size, &mut rays);
             }
             rays
         })

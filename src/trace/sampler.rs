@@ -40,6 +40,18 @@ impl Sampler {
         [0, 1].map(|half| Self::new(pixel, half, settings.seed).spread(settings))
     }
 
+    /// [`Sampler::halves`] of all pixels of a tile, row by row.
+    pub fn tile(origin: UVec2, size: UVec2, settings: &RenderSettings, mut report: impl FnMut([Self; 2])) {
+        let like = Self::new(origin, 0, settings.seed).spread(settings);
+        let halves = [0, 1].map(|half| hash(settings.seed ^ hash(half ^ 0x5bd1_e995)));
+        for y in origin.y..origin.y + size.y {
+            let [even, odd] = halves.map(|half| hash(y ^ half));
+            for x in origin.x..origin.x + size.x {
+                report([Self { seed: hash(x ^ even), ..like }, Self { seed: hash(x ^ odd), ..like }]);
+            }
+        }
+    }
+
     /// Sample number `index` of the same pixel and half.
     #[must_use]
     pub fn at(self, index: u32) -> Self {
@@ -56,19 +68,21 @@ impl Sampler {
     /// Two numbers in [0, 1), stratified together over the samples of this pixel.
     #[must_use]
     pub fn pair(&self, dimension: u32) -> Vec2 {
+        let sampling = if dimension == 0 { self.pixel_sampling } else { self.sampling };
+        if sampling == Sampling::Sobol {
+            return sobol(self.seed, self.index, dimension);
+        }
         let seed = hash(self.seed ^ dimension.wrapping_mul(0x9e37_79b9));
         let (x_seed, y_seed) = (hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93));
-        let (x, y) = match if dimension == 0 { self.pixel_sampling } else { self.sampling } {
-            Sampling::Sobol => {
-                let index = owen_scramble(self.index, seed);
-                (owen_scramble(index.reverse_bits(), x_seed), owen_scramble(sobol_1(index), y_seed))
-            }
+        let (x, y) = match sampling {
             Sampling::Shifted => {
                 // Shuffled all the same: otherwise all pairs would be the same points.
                 let index = owen_scramble(self.index, seed);
                 (index.reverse_bits().wrapping_add(x_seed), sobol_1(index).wrapping_add(y_seed))
             }
-            Sampling::Independent => (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index))),
+            Sampling::Independent | Sampling::Sobol => {
+                (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index)))
+            }
             Sampling::Stratified => {
                 let cell = shuffle_16(self.index & 15, hash(seed ^ hash(self.index >> 4)));
                 let within = |seed| hash(seed ^ hash(self.index)) >> 2;
@@ -85,18 +99,72 @@ impl Sampler {
     }
 }
 
+/// [`Sampler::pair`] of a seed and an index, for [`Sampling::Sobol`].
+#[inline(always)]
+fn sobol(seed: u32, index: u32, dimension: u32) -> Vec2 {
+    let seed = hash(seed ^ dimension.wrapping_mul(0x9e37_79b9));
+    let (x_seed, y_seed) = (hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93));
+    let index = owen_scramble(index, seed);
+    let x = owen_scramble(index.reverse_bits(), x_seed);
+    let y = owen_scramble(sobol_1(index), y_seed);
+    Vec2::new(unit_float(x), unit_float(y))
+}
+
+/// Samplers side by side.
+#[derive(Clone, Debug)]
+pub struct SamplerRow<const N: usize> {
+    seeds: [u32; N],
+    indices: [u32; N],
+    /// Of any of them: all are of one picture.
+    like: Sampler,
+}
+
+impl<const N: usize> SamplerRow<N> {
+    /// All of them that one.
+    #[must_use]
+    pub fn new(like: Sampler) -> Self {
+        Self { seeds: [like.seed; N], indices: [like.index; N], like }
+    }
+
+    /// Puts one in its place; it must be spread as the others are.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, sampler: &Sampler) {
+        (self.seeds[i], self.indices[i]) = (sampler.seed, sampler.index);
+    }
+
+    /// [`Sampler::pair`] of each.
+    #[inline(always)]
+    pub fn pairs(&self, dimension: u32, x: &mut [f32; N], y: &mut [f32; N]) {
+        let sampling = if dimension == 0 { self.like.pixel_sampling } else { self.like.sampling };
+        if sampling == Sampling::Sobol {
+            for i in 0..N {
+                let pair = sobol(self.seeds[i], self.indices[i], dimension);
+                (x[i], y[i]) = (pair.x, pair.y);
+            }
+        } else {
+            for i in 0..N {
+                let sampler = Sampler { seed: self.seeds[i], index: self.indices[i], ..self.like };
+                let pair = sampler.pair(dimension);
+                (x[i], y[i]) = (pair.x, pair.y);
+            }
+        }
+    }
+}
+
 fn pixel_seed(pixel: UVec2, half: u32, seed: u32) -> u32 {
     hash(pixel.x ^ hash(pixel.y ^ hash(seed ^ hash(half ^ 0x5bd1_e995))))
 }
 
 /// The top 24 bits as a number in [0, 1); never 1, whatever `x` is.
 #[must_use]
+#[inline(always)]
 pub fn unit_float(x: u32) -> f32 {
     (x >> 8) as f32 / (1 << 24) as f32
 }
 
 /// An integer hash with good avalanche: C. Wellons' "lowbias32" (nullprogram.com, 2018).
 #[must_use]
+#[inline(always)]
 pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -116,6 +184,7 @@ fn shuffle_16(x: u32, seed: u32) -> u32 {
 }
 
 /// Owen's nested uniform scrambling of the binary digits of `x`, most significant first.
+#[inline(always)]
 fn owen_scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -127,6 +196,7 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
 }
 
 /// The second dimension of the Sobol' sequence (the first is the reversed bits of the index).
+#[inline(always)]
 fn sobol_1(index: u32) -> u32 {
     // The generator matrix is Pascal's triangle modulo 2: bit j of the result, from the top, is the parity
     // of all bits of the index whose number has those of j. Five sweeps, one for each bit of that number.
@@ -182,6 +252,20 @@ mod tests {
                 assert!(filled.iter().all(|&f| f), "m {m}, split {split}");
             }
         }
+    }
+
+    #[test]
+    fn a_tile_has_the_samplers_of_its_pixels() {
+        let settings =
+            RenderSettings { seed: 7, sampling: Sampling::Stratified, ..RenderSettings::default() };
+        let (origin, size) = (UVec2::new(16, 8), UVec2::new(5, 3));
+        let mut all = Vec::new();
+        Sampler::tile(origin, size, &settings, |halves| all.push(halves));
+        for (i, halves) in (0..).zip(&all) {
+            let pixel = origin + UVec2::new(i % size.x, i / size.x);
+            assert_eq!(*halves, Sampler::halves(pixel, &settings));
+        }
+        assert_eq!(all.len(), 15);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
 use crate::bvh::{Accept, Hit, Ray, Tlas};
-use crate::scene::{Alpha, Body, Layers, Material, NormalMap, Texture, TriangleMesh};
+use crate::scene::{Alpha, Body, Glossy, Layers, Material, NormalMap, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -73,6 +73,21 @@ pub struct Surface {
     pub passed: Option<Arc<Passed>>,
 }
 
+impl Surface {
+    /// Whether all it does is to reflect evenly (Lambert), whatever its colour.
+    #[inline]
+    #[must_use]
+    pub fn is_diffuse(&self) -> bool {
+        let m = &self.material;
+        matches!(m.glossy, Glossy::None)
+            && m.mirror == Vec3::ZERO
+            && m.glass.is_none()
+            && self.normal_map.is_none()
+            && m.emission == Vec3::ZERO
+            && !m.unlit
+    }
+}
+
 /// A texture and how to reach into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureIndex {
@@ -125,6 +140,7 @@ pub struct TraceScene<'a> {
 
 impl<'a> TraceScene<'a> {
     /// The instance and the material of a hit.
+    #[inline]
     #[must_use]
     pub fn surface_at(&self, hit: &Hit) -> (&'a InstanceData, &'a Surface) {
         let instance = &self.geometry.instances[hit.instance as usize];

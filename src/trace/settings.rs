@@ -22,6 +22,8 @@ pub struct RenderSettings {
     pub sampling: Sampling,
     /// The same for the places in the pixel alone; `None`: as all others.
     pub pixel_sampling: Option<Sampling>,
+    /// Whether light is computed instead of sampled where nothing can be in its way.
+    pub shafts: bool,
 }
 
 /// How the random numbers of a pixel are spread over its samples. All give the same picture in the end;
@@ -70,6 +72,7 @@ impl Default for RenderSettings {
             filter: None,
             sampling: Sampling::Sobol,
             pixel_sampling: None,
+            shafts: true,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Area lights with a shape of their own: sampled like all lights, and solid to rays.
 
 use super::light::{LightSample, error_of, sample_flat};
+use super::quad::Quad;
 use super::warp::{cone, cone_pdf, offset, uniform_sphere};
 use crate::bvh::{Aabb, Ray};
 use glam::{DVec3, Vec2, Vec3};
@@ -27,15 +28,8 @@ pub struct ShapeLight {
 /// Forms of area lights.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// `corner` + a `u` + b `v`, a and b in 0..=1; the front is the side of u × v.
-    Parallelogram {
-        /// Where a and b are 0.
-        corner: Vec3,
-        /// Whole first edge.
-        u: Vec3,
-        /// Whole second edge.
-        v: Vec3,
-    },
+    /// The front is the side of u × v.
+    Parallelogram(Quad),
     /// A flat round plate.
     Disk {
         /// Its middle.
@@ -64,13 +58,18 @@ impl ShapeLight {
         Self { shape, radiance, two_sided, visible, normal, area, reach }
     }
 
-    /// A direction toward it from `point`; see [`super::light::FlatLight::sample`].
-    pub(super) fn sample(&self, point: Vec3, u: Vec2) -> Option<LightSample> {
+    /// A direction toward it from `point` with `normal`; see [`super::light::FlatLight::sample`].
+    pub(super) fn sample(&self, point: Vec3, normal: Vec3, u: Vec2) -> Option<LightSample> {
         match &self.shape {
-            Shape::Parallelogram { corner, u: edge_u, v: edge_v } => {
-                let position = *corner + *edge_u * u.x + *edge_v * u.y;
-                let radiance = self.radiance_at(u);
-                sample_flat(point, position, self.normal, self.area, self.two_sided, radiance)
+            Shape::Parallelogram(quad) => {
+                let place = quad.brightness(point, normal).sample(u);
+                // Also where a corner is at the very point.
+                if place.density.is_nan() || place.density <= 0.0 {
+                    return None;
+                }
+                let area = self.area / place.density;
+                let radiance = self.radiance_at(Vec2::new(place.a, place.b));
+                sample_flat(point, quad.at(&place), self.normal, area, self.two_sided, radiance)
             }
             Shape::Disk { center, normal, radius } => {
                 let (tangent, bitangent) = normal.any_orthonormal_pair();
@@ -102,29 +101,38 @@ impl ShapeLight {
         }
     }
 
-    /// Density in solid angle of [`ShapeLight::sample`] for a ray from `origin` that hits at `hit`.
-    fn pdf(&self, ray: &Ray, hit: &ShapeHit) -> f32 {
+    /// Density in solid angle of [`ShapeLight::sample`] for a ray that leaves a surface with `normal` and hits at `hit`.
+    #[must_use]
+    pub fn pdf(&self, ray: &Ray, normal: Vec3, hit: &ShapeHit) -> f32 {
         match &self.shape {
             Shape::Sphere { center, radius } => {
                 let sin2 = radius * radius / center.distance_squared(ray.origin);
                 if sin2 < 1.0 { cone_pdf(sin2) } else { 0.25 / PI }
             }
-            _ => {
+            shape => {
+                let density = match shape {
+                    Shape::Parallelogram(quad) => {
+                        quad.brightness(ray.origin, normal).density(hit.uv.x, hit.uv.y)
+                    }
+                    _ => 1.0,
+                };
                 let distance2 = (hit.t * ray.direction.length()).powi(2);
                 let cos = self.normal.dot(ray.direction.normalize()).abs();
-                distance2 / (self.area * cos)
+                density * distance2 / (self.area * cos)
             }
         }
     }
 
     /// Where `ray` meets it; solid on both sides, whether it shines there or not.
+    #[inline]
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
-        if self.surely_missed(ray) {
-            return None;
-        }
+        if self.surely_missed(ray) { None } else { self.exact_hit(ray) }
+    }
+
+    fn exact_hit(&self, ray: &Ray) -> Option<ShapeHit> {
         let hit = match &self.shape {
-            Shape::Parallelogram { corner, u, v } => {
+            Shape::Parallelogram(Quad { corner, u, v, .. }) => {
                 let (u64, v64) = (u.as_dvec3(), v.as_dvec3());
                 let normal = u64.cross(v64);
                 let (t, p) = plane_hit(ray, *corner, normal)?;
@@ -151,9 +159,10 @@ impl ShapeLight {
 
     /// Whether the ray ends before the plane of a flat one, or goes away from it, by a margin far above all
     /// rounding: most do, and need no more exact answer.
+    #[inline]
     fn surely_missed(&self, ray: &Ray) -> bool {
         let corner = match &self.shape {
-            Shape::Parallelogram { corner, .. } => *corner,
+            Shape::Parallelogram(quad) => quad.corner,
             Shape::Disk { center, .. } => *center,
             Shape::Sphere { .. } => return false,
         };
@@ -164,15 +173,14 @@ impl ShapeLight {
         height < -margin || height > slope.abs() * (1.0001 * ray.t_max) + margin
     }
 
-    /// Emitted radiance back along a ray that hit here, and the density of sampling its direction.
+    /// Emitted radiance back along a ray that hit here.
     #[must_use]
-    pub fn emitted(&self, ray: &Ray, hit: &ShapeHit) -> (Vec3, f32) {
+    pub fn emitted(&self, ray: &Ray, hit: &ShapeHit) -> Vec3 {
         let shines = match &self.shape {
             Shape::Sphere { .. } => true,
             _ => self.two_sided || self.normal.dot(ray.direction) < 0.0,
         };
-        let radiance = if shines { self.radiance_at(hit.uv) } else { Vec3::ZERO };
-        (radiance, self.pdf(ray, hit))
+        if shines { self.radiance_at(hit.uv) } else { Vec3::ZERO }
     }
 
     fn radiance_at(&self, uv: Vec2) -> Vec3 {
@@ -195,7 +203,7 @@ impl Shape {
     #[must_use]
     pub fn area(&self) -> f32 {
         match self {
-            Self::Parallelogram { u, v, .. } => u.cross(*v).length(),
+            Self::Parallelogram(quad) => quad.area,
             Self::Disk { radius, .. } => PI * radius * radius,
             Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
         }
@@ -205,9 +213,7 @@ impl Shape {
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         match self {
-            Self::Parallelogram { corner, u, v } => {
-                Aabb::around(&[*corner, *corner + *u, *corner + *v, *corner + *u + *v])
-            }
+            Self::Parallelogram(quad) => Aabb::around(&quad.corners()),
             Self::Disk { center, radius, .. } | Self::Sphere { center, radius } => {
                 Aabb { min: *center - *radius, max: *center + *radius }
             }
@@ -216,7 +222,7 @@ impl Shape {
 
     fn normal(&self) -> Vec3 {
         match self {
-            Self::Parallelogram { u, v, .. } => u.cross(*v).normalize_or(Vec3::Z),
+            Self::Parallelogram(quad) => quad.normal,
             Self::Disk { normal, .. } => *normal,
             Self::Sphere { .. } => Vec3::ZERO,
         }

@@ -33,7 +33,7 @@ pub struct Interaction {
 }
 
 /// 2⁻²⁴, the rounding unit of f32.
-const UNIT: f64 = 1.0 / (1 << 24) as f64;
+pub(super) const UNIT: f64 = 1.0 / (1 << 24) as f64;
 
 impl Interaction {
     /// Looks up `hit` of `ray` on `instance`, placed by number `hit.instance`.

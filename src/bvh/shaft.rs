@@ -1,0 +1,206 @@
+//! Is anything between here and there? Not for one ray but for all from one patch to another.
+//!
+//! A *shaft* is the convex hull of two flat pieces, say a patch of floor and a lamp. A triangle that is outside of
+//! one of some planes around it, or has both pieces on one side of its own plane, is in the way of no segment between
+//! them. So who is not named is certainly not in the way, and who is named may be harmless.
+//!
+//! Reference: E. A. Haines, J. R. Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991.
+
+use super::wide::{Child, WIDTH, WideBvh};
+use super::{Aabb, Blas, Tlas};
+use glam::{DAffine3, DVec3, Vec3};
+
+/// The space between two convex pieces.
+#[derive(Clone, Debug)]
+pub struct Shaft {
+    /// Of the first piece, then of the second.
+    corners: Vec<DVec3>,
+    /// How many the first has.
+    first: usize,
+    bounds: Aabb,
+    /// Outward normals, and what n · p is at most inside.
+    planes: Vec<(DVec3, f64)>,
+}
+
+/// So many nodes may be looked at before the search is given up.
+const PATIENCE: usize = 256;
+/// Rounding of coordinates and of rays between them, as a part of the largest coordinate.
+const MARGIN: f64 = 1.0 / (1 << 19) as f64;
+/// How far behind a triangle's plane a patch that lies in it may seem to be, likewise.
+const FLATNESS: f64 = 1.0 / (1 << 21) as f64;
+
+impl Shaft {
+    /// From one flat piece, the convex hull of its corners, to another.
+    #[must_use]
+    pub fn new(from: &[DVec3], to: &[DVec3]) -> Self {
+        Self::around([from, to].concat(), from.len())
+    }
+
+    fn around(corners: Vec<DVec3>, first: usize) -> Self {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in &corners {
+            (low, high) = (low.min(*p), high.max(*p));
+        }
+        let margin = MARGIN * reach(&corners);
+        let bounds = Aabb {
+            min: (low - margin).as_vec3().map(f32::next_down),
+            max: (high + margin).as_vec3().map(f32::next_up),
+        };
+        let mut planes = Vec::with_capacity(24);
+        for axis in 0..3 {
+            outline(&corners, axis, |normal| {
+                let most = corners.iter().map(|p| normal.dot(*p)).fold(f64::NEG_INFINITY, f64::max);
+                planes.push((normal, most + margin * normal.abs().element_sum()));
+            });
+        }
+        Self { corners, first, bounds, planes }
+    }
+
+    fn moved(&self, by: &DAffine3) -> Self {
+        Self::around(self.corners.iter().map(|p| by.transform_point3(*p)).collect(), self.first)
+    }
+
+    /// Whether the box is surely outside.
+    #[must_use]
+    pub fn misses_box(&self, aabb: &Aabb) -> bool {
+        let (min, max) = (aabb.min.as_dvec3(), aabb.max.as_dvec3());
+        !aabb.overlaps(&self.bounds)
+            || self.planes.iter().any(|(normal, most)| {
+                let nearest = DVec3::select(normal.cmpgt(DVec3::ZERO), min, max);
+                normal.dot(nearest) > *most
+            })
+    }
+
+    /// Whether the triangle is surely in nobody's way.
+    #[must_use]
+    pub fn misses_triangle(&self, corners: &[Vec3; 3]) -> bool {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let around = Aabb::around(corners);
+        if !around.overlaps(&self.bounds) {
+            return true;
+        }
+        let outside = |(normal, most): &(DVec3, f64)| {
+            normal.dot(a) > *most && normal.dot(b) > *most && normal.dot(c) > *most
+        };
+        if self.planes.iter().any(outside) {
+            return true;
+        }
+        let normal = (b - a).cross(c - a);
+        let tolerance = FLATNESS * normal.abs().element_sum() * reach(&self.corners);
+        let height = |p: &DVec3| normal.dot(*p - a);
+        // The first piece lies in its plane, or all is on one side.
+        self.corners[..self.first].iter().all(|p| height(p).abs() <= tolerance)
+            || self.corners.iter().all(|p| height(p) >= -tolerance)
+            || self.corners.iter().all(|p| height(p) <= tolerance)
+    }
+}
+
+impl Tlas {
+    /// Calls `report` with the instance and the corners, placed, of each triangle that may be in the way of some segment
+    /// within `shaft`; surfaces in which the shaft's first piece lies are not. Stops when `report` says false, or there
+    /// is too much to look at; says whether neither happened.
+    #[must_use]
+    pub fn blockers(&self, shaft: &Shaft, mut report: impl FnMut(u32, [Vec3; 3]) -> bool) -> bool {
+        let mut patience = PATIENCE;
+        search(self.hierarchy(), shaft, &mut patience, |(entry, _), patience| {
+            let instance = self.hierarchy().prims[entry];
+            let placement = &self.placements()[instance as usize];
+            let blas = placement.blas();
+            if placement.is_identity() {
+                return blas.blockers(shaft, patience, |triangle| report(instance, triangle));
+            }
+            let local = shaft.moved(placement.local_from_world());
+            blas.blockers(&local, patience, |triangle| {
+                let placed = |p: Vec3| placement.world_from_local().transform_point3(p.as_dvec3()).as_vec3();
+                report(instance, triangle.map(placed))
+            })
+        })
+    }
+}
+
+impl Blas {
+    fn blockers(
+        &self,
+        shaft: &Shaft,
+        patience: &mut usize,
+        mut report: impl FnMut([Vec3; 3]) -> bool,
+    ) -> bool {
+        shaft.misses_box(&self.bounds())
+            || search(&self.wide, shaft, patience, |(first, count), _| {
+                self.leaves
+                    .triangles(first, count)
+                    .all(|triangle| shaft.misses_triangle(&triangle) || report(triangle))
+            })
+    }
+}
+
+/// Calls `visit` with all leaves, first entry and number of entries, that are not outside, until it says false.
+fn search(
+    wide: &WideBvh,
+    shaft: &Shaft,
+    patience: &mut usize,
+    mut visit: impl FnMut((usize, usize), &mut usize) -> bool,
+) -> bool {
+    let mut waiting = Vec::with_capacity(64);
+    if !wide.nodes.is_empty() {
+        waiting.push(0);
+    }
+    while let Some(index) = waiting.pop() {
+        if *patience == 0 {
+            return false;
+        }
+        *patience -= 1;
+        let node = &wide.nodes[index];
+        for slot in 0..WIDTH {
+            let bounds = node.child_bounds(slot);
+            if bounds.is_empty() || shaft.misses_box(&bounds) {
+                continue;
+            }
+            match Child::unpack(node.children[slot]) {
+                Child::Node(child) => waiting.push(child),
+                Child::Leaf { first, count } => {
+                    if !visit((first, count), patience) {
+                        return false;
+                    }
+                }
+            }
+        }
+    }
+    true
+}
+
+/// The largest coordinate without sign.
+fn reach(corners: &[DVec3]) -> f64 {
+    corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
+}
+
+/// The outward normals of the edges of what the corners look like along `axis`.
+fn outline(corners: &[DVec3], axis: usize, mut report: impl FnMut(DVec3)) {
+    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut flat: Vec<_> = corners.iter().map(|p| (p[i], p[j])).collect();
+    flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let turn =
+        |a: (f64, f64), b: (f64, f64), c: (f64, f64)| (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0);
+    // The lower chain, then the upper one (A. M. Andrew, 1979).
+    for _ in 0..2 {
+        let mut chain: Vec<(f64, f64)> = Vec::with_capacity(flat.len());
+        for &p in &flat {
+            while let [.., a, b] = chain[..]
+                && turn(a, b, p) <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(p);
+        }
+        for edge in chain.windows(2) {
+            let mut normal = DVec3::ZERO;
+            normal[i] = edge[1].1 - edge[0].1;
+            normal[j] = edge[0].0 - edge[1].0;
+            let normal = normal.normalize_or_zero();
+            if normal != DVec3::ZERO {
+                report(normal);
+            }
+        }
+        flat.reverse();
+    }
+}

@@ -1,0 +1,375 @@
+//! Surfaces that only reflect evenly: most of what there is, shaded by whole blocks.
+//!
+//! Where it is known what is in the way of a light, it is computed instead of sampled: no shadow rays, and no noise.
+
+use super::block::{Arrivals, Block, Depart, Departures, IntegrateQuad, LANES, SampleQuad};
+use super::bsdf::normal::facing;
+use super::film::Tile;
+use super::integrator::{
+    Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, PICK, Path, ROULETTE_DEPTH, Shadow,
+    mesh_emission, power_heuristic,
+};
+use super::light::FlatLight;
+use super::quad::Quad;
+use super::shape_light::{Shape, ShapeLight};
+use super::sightlines::{Sightlines, Window};
+use super::surface::Interaction;
+use super::visible::{HIDDEN, Reach, irradiance};
+use super::{Integrator, TraceScene};
+use crate::bvh::{Hit, Ray};
+use glam::{UVec2, Vec3};
+use std::f32::consts::PI;
+
+/// Where paths of a wave have met diffuse surfaces, and what is needed to go on from there.
+#[derive(Debug, Default)]
+pub(super) struct Diffuse {
+    /// Paths by what their points need: where something is known of lights, elsewhere, and those on surfaces that are
+    /// textured, smooth or placed.
+    kinds: [Vec<Arrived>; 3],
+    /// If anybody wants to know what is in the way.
+    window: Option<Window>,
+    /// Whether camera rays may run into lights.
+    pub(super) lights_in_view: bool,
+    /// Those of the tile, which lends them.
+    sightlines: Sightlines,
+    /// What has been asked about triangles in this batch.
+    asked: Vec<((u32, u32), Option<u32>)>,
+    /// Lights that have been counted in full, a bit for each, of each point of the block.
+    counted: Vec<u32>,
+    block: Option<Box<Block>>,
+    arrivals: Box<Arrivals>,
+    departures: Box<Departures>,
+}
+
+/// Number of a path, and what [`Sightlines::of`] says.
+#[derive(Clone, Copy, Debug)]
+struct Arrived {
+    path: u32,
+    known: Option<u32>,
+}
+
+/// So many answers are at hand.
+const ASKED: usize = 64;
+
+impl Diffuse {
+    /// Begins with another batch.
+    pub(super) fn enter(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2) {
+        let window = Window::new(scene, tile, size);
+        self.lights_in_view = scene.lights.any_shape(|bounds| !window.hides(&bounds));
+        self.window = (scene.settings.shafts && scene.lights.samples_all(0)).then_some(window);
+        self.sightlines = std::mem::take(&mut tile.sightlines);
+        self.sightlines.tidy();
+        self.asked.clear();
+        self.asked.resize(ASKED, ((u32::MAX, u32::MAX), None));
+    }
+
+    /// Ends with it.
+    pub(super) fn leave(&mut self, tile: &mut Tile) {
+        tile.sightlines = std::mem::take(&mut self.sightlines);
+    }
+
+    /// Notes that path number `path` ends in `hit`.
+    pub(super) fn add(&mut self, scene: &TraceScene, path: usize, hit: &Hit, depth: u32) {
+        let known = if depth == 0 { self.ask(scene, hit) } else { None };
+        let data = &scene.geometry.instances[hit.instance as usize];
+        let flat = data.mesh.normals.is_empty()
+            && data.mesh.colors.is_empty()
+            && scene.geometry.tlas.placements()[hit.instance as usize].is_identity()
+            && scene.surface_at(hit).1.base_color_texture.is_none();
+        let kind = if !flat { 2 } else { usize::from(known.is_none()) };
+        self.kinds[kind].push(Arrived { path: path as u32, known });
+    }
+
+    fn ask(&mut self, scene: &TraceScene, hit: &Hit) -> Option<u32> {
+        let window = self.window.as_ref()?;
+        let triangle = (hit.instance, hit.triangle);
+        let asked = &mut self.asked[(hit.triangle ^ hit.instance << 3) as usize % ASKED];
+        if asked.0 != triangle {
+            *asked = (triangle, self.sightlines.of(scene, window, hit));
+        }
+        asked.1
+    }
+}
+
+/// What a parallelogram light brings: all of it where it is known what is in the way, elsewhere by a sample each.
+fn arrive_from_quad(
+    scene: &TraceScene,
+    block: &Block,
+    sightlines: &Sightlines,
+    shape: &ShapeLight,
+    light: u32,
+    dimension: u32,
+    out: &mut Arrivals,
+) {
+    let Shape::Parallelogram(quad) = &shape.shape else { return };
+    let isa = scene.geometry.tlas.isa();
+    let mut missing = block.count;
+    out.certain = [false; LANES];
+    if shape.radiance.iter().all(|r| *r == shape.radiance[0]) {
+        let radiance = shape.radiance[0];
+        let which = in_the_way(scene, block, sightlines, quad, light);
+        for i in 0..block.count {
+            out.certain[i] = which[i] == Some(0);
+        }
+        if out.certain[..block.count].contains(&true) {
+            isa.run(IntegrateQuad { block, quad, radiance, two_sided: shape.two_sided, out });
+        }
+        for i in 0..block.count {
+            if !out.certain[i]
+                && let Some(which) = which[i]
+                && let Some(irradiance) = seen_past(block, i, shape, quad, sightlines, light, which)
+            {
+                out.contribution.set(i, block.throughput.get(i) * radiance * (irradiance / PI));
+                out.certain[i] = true;
+            }
+            missing -= usize::from(out.certain[i]);
+        }
+    }
+    if missing > 0 {
+        let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
+        let shared = scene.settings.integrator == Integrator::Path;
+        isa.run(SampleQuad { block, quad, radiance, two_sided, dimension, shared, out });
+    }
+}
+
+/// For each point of a block which of the known blockers may hide some of a light; `None` where they are not known.
+fn in_the_way(
+    scene: &TraceScene,
+    block: &Block,
+    sightlines: &Sightlines,
+    quad: &Quad,
+    light: u32,
+) -> [Option<u32>; LANES] {
+    let mut which = [None; LANES];
+    let mut done = 0;
+    // Neighbours are mostly on the same triangle.
+    while let Some(first) = (done..block.count).find(|&i| block.known[i].is_some()) {
+        let known = block.known[first];
+        let own = |i: &usize| block.known[*i] == known;
+        let end = first + (first..block.count).take_while(own).count();
+        if let Some(blockers) = known.and_then(|known| sightlines.blockers(known, light)) {
+            let mut out = [0; LANES];
+            if !blockers.is_empty() {
+                scene.geometry.tlas.isa().run(Reach { block, quad, blockers, out: &mut out });
+            }
+            for i in first..end {
+                which[i] = Some(out[i]);
+            }
+        }
+        done = end;
+    }
+    which
+}
+
+/// Irradiance at a point of a block from a light of radiance 1 past those of its blockers, if it can be told.
+fn seen_past(
+    block: &Block,
+    i: usize,
+    shape: &ShapeLight,
+    quad: &Quad,
+    sightlines: &Sightlines,
+    light: u32,
+    which: u32,
+) -> Option<f32> {
+    let point = block.position.get(i);
+    if which == HIDDEN || !shape.two_sided && (point - quad.corner).dot(quad.normal) <= 0.0 {
+        return Some(0.0);
+    }
+    if !quad.is_large(point) {
+        return None;
+    }
+    let blockers = sightlines.blockers(block.known[i]?, light)?;
+    irradiance(quad, point, [block.normal.get(i), block.geometric_normal.get(i)], blockers, which)
+}
+
+impl Batch {
+    /// What comes from all points that [`Diffuse::add`] has noted.
+    pub(super) fn shade_diffuse(&mut self, scene: &TraceScene) {
+        for kind in 0..3 {
+            let points = std::mem::take(&mut self.diffuse.kinds[kind]);
+            for chunk in points.chunks(LANES) {
+                let like = self.path(chunk[0].path as usize).sampler;
+                let mut block = self.diffuse.block.take().unwrap_or_else(|| Box::new(Block::new(like)));
+                self.fill(scene, &mut block, chunk, kind < 2);
+                self.diffuse.counted.clear();
+                self.diffuse.counted.resize(chunk.len(), 0);
+                self.light_block(scene, &block);
+                if scene.settings.integrator == Integrator::Path {
+                    self.follow_block(scene, &block);
+                }
+                self.diffuse.block = Some(block);
+            }
+            self.diffuse.kinds[kind] = points;
+            self.diffuse.kinds[kind].clear();
+        }
+    }
+
+    fn fill(&self, scene: &TraceScene, block: &mut Block, points: &[Arrived], flat: bool) {
+        block.count = points.len();
+        for (i, arrived) in points.iter().enumerate() {
+            let path = self.path(arrived.path as usize);
+            let Some(hit) = &self.hits[arrived.path as usize] else { continue };
+            block.paths[i] = arrived.path;
+            block.known[i] = arrived.known;
+            block.samplers.set(i, &path.sampler);
+            let (instance, surface) = scene.surface_at(hit);
+            let mut albedo = surface.material.base_color;
+            if flat {
+                let corners = instance.mesh.corners(hit.triangle as usize);
+                for (rows, corner) in block.corners.iter_mut().zip(corners) {
+                    rows.set(i, corner);
+                }
+                block.weights.set(i, Vec3::new(hit.u, hit.v, 0.0));
+                block.direction.set(i, path.ray.direction);
+            } else {
+                let mut at = Interaction::new(scene, instance, hit, &path.ray);
+                at.normal = facing(at.normal, &at);
+                let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
+                albedo *= texel.truncate();
+                block.set_point(i, &at);
+            }
+            block.throughput.set(i, path.throughput * albedo);
+        }
+        if flat {
+            block.find_points(scene.geometry.tlas.isa());
+        }
+    }
+
+    /// Adds what lights bring for sure, and queues shadow rays for the rest.
+    fn light_block(&mut self, scene: &TraceScene, block: &Block) {
+        let depth = self.path(block.paths[0] as usize).depth;
+        let base = 1 + depth * PAIRS_PER_BOUNCE;
+        if !scene.lights.samples_all(depth) {
+            for i in 0..block.count {
+                let random = self.path(block.paths[i] as usize).sampler.pair(base + PICK).x;
+                let pick = scene.lights.pick(depth, 0, random);
+                self.light_point(scene, block, i, pick.light, pick.chance, base + LIGHT);
+            }
+            return;
+        }
+        let mut arrivals = std::mem::take(&mut self.diffuse.arrivals);
+        for light in 0..scene.lights.len() as u32 {
+            let dimension = base + LIGHT + 2 * light;
+            match scene.lights.get(light) {
+                FlatLight::Shape(shape) if matches!(shape.shape, Shape::Parallelogram(_)) => {
+                    let sightlines = &self.diffuse.sightlines;
+                    arrive_from_quad(scene, block, sightlines, shape, light, dimension, &mut arrivals);
+                    self.take_arrivals(block, light, depth, &arrivals);
+                }
+                _ => {
+                    for i in 0..block.count {
+                        self.light_point(scene, block, i, light, 1.0, dimension);
+                    }
+                }
+            }
+        }
+        self.diffuse.arrivals = arrivals;
+    }
+
+    fn take_arrivals(&mut self, block: &Block, light: u32, depth: u32, arrivals: &Arrivals) {
+        for i in 0..block.count {
+            let contribution = arrivals.contribution.get(i);
+            self.diffuse.counted[i] |= u32::from(arrivals.certain[i]) << light;
+            if contribution == Vec3::ZERO {
+                continue;
+            }
+            let path = self.path(block.paths[i] as usize);
+            if arrivals.certain[i] {
+                self.radiance[path.entry as usize] += contribution;
+                continue;
+            }
+            let origin = block.origin.get(i);
+            let ray = Ray { origin, direction: arrivals.target.get(i) - origin, t_max: 1.0 };
+            // A light nearer than rounding has no ray to it, and nothing fits between.
+            if ray.direction != Vec3::ZERO {
+                let key = light.wrapping_add(depth << 16).wrapping_add(1 << 31);
+                let (entry, sampler) = (path.entry, path.sampler);
+                self.shadows.push(Shadow { entry, sampler, ray, light, triangle: None, contribution, key });
+            }
+        }
+    }
+
+    /// Samples any light for one point.
+    fn light_point(
+        &mut self,
+        scene: &TraceScene,
+        block: &Block,
+        i: usize,
+        light: u32,
+        chance: f32,
+        dimension: u32,
+    ) {
+        let path = self.path(block.paths[i] as usize);
+        let (position, normal, geometric) =
+            (block.position.get(i), block.normal.get(i), block.geometric_normal.get(i));
+        let random = path.sampler.pair(dimension);
+        let Some(sample) = scene.lights.get(light).sample(position, normal, random) else { return };
+        let cosine = normal.dot(sample.wi);
+        if cosine <= 0.0 || geometric.dot(sample.wi) <= 0.0 {
+            return;
+        }
+        let weight = match sample.pdf {
+            None => cosine / (PI * chance),
+            Some(pdf) => {
+                let light_pdf = pdf * chance;
+                let shared = match scene.settings.integrator {
+                    Integrator::Direct => 1.0,
+                    Integrator::Path => power_heuristic(light_pdf, cosine / PI),
+                };
+                cosine * shared / (PI * light_pdf)
+            }
+        };
+        let mut contribution = block.throughput.get(i) * sample.radiance * weight;
+        if let Some((instance, triangle)) = sample.triangle {
+            contribution *= mesh_emission(scene, instance, triangle, &sample);
+        }
+        if contribution == Vec3::ZERO {
+            return;
+        }
+        let origin = block.origin.get(i);
+        let ray = match sample.target {
+            Some(target) => Ray { origin, direction: target - origin, t_max: 1.0 },
+            None => Ray::new(origin, sample.wi),
+        };
+        if ray.direction != Vec3::ZERO {
+            let key = light.wrapping_add(path.depth << 16).wrapping_add(1 << 31);
+            let (entry, sampler, triangle) = (path.entry, path.sampler, sample.triangle);
+            self.shadows.push(Shadow { entry, sampler, ray, light, triangle, contribution, key });
+        }
+    }
+
+    /// Sends paths on.
+    fn follow_block(&mut self, scene: &TraceScene, block: &Block) {
+        let depth = self.path(block.paths[0] as usize).depth;
+        let base = 1 + depth * PAIRS_PER_BOUNCE;
+        let mut out = std::mem::take(&mut self.diffuse.departures);
+        scene.geometry.tlas.isa().run(Depart { block, dimension: base + DIRECTION, out: &mut out });
+        for i in 0..block.count {
+            let path = self.path(block.paths[i] as usize);
+            let mut throughput = block.throughput.get(i);
+            let pdf = out.pdf[i];
+            if pdf <= 0.0 || throughput == Vec3::ZERO {
+                continue;
+            }
+            if depth >= ROULETTE_DEPTH {
+                let survival = throughput.max_element().clamp(0.05, 1.0);
+                if path.sampler.pair(base + LOBE).y >= survival {
+                    continue;
+                }
+                throughput /= survival;
+            }
+            let direction = out.direction.get(i);
+            self.next.push(Path {
+                entry: path.entry,
+                sampler: path.sampler,
+                ray: Ray::new(block.origin.get(i), direction),
+                throughput,
+                depth: depth + 1,
+                bounce: Some(Bounce { pdf, normal: block.normal.get(i), counted: self.diffuse.counted[i] }),
+                last: false,
+                absorption: Vec3::ZERO,
+            });
+        }
+        self.diffuse.departures = out;
+    }
+}

@@ -1,0 +1,308 @@
+//! The part of a lamp that a point sees past a few triangles, exactly: penumbrae without noise.
+//!
+//! The lamp's parallelogram is cut along the planes through the point and each triangle's edges; what is inside of all
+//! of a triangle's planes is hidden. What is left are convex pieces, each with Lambert's closed form. This is K. Weiler
+//! and P. Atherton's "Hidden Surface Removal Using Polygon Area Sorting", SIGGRAPH 1977, with lamps for surfaces, as
+//! T. Nishita and E. Nakamae used it for shadows, "Continuous Tone Representation of Three-Dimensional Objects Taking
+//! Account of Shadows and Interreflection", 1985.
+
+use super::block::{Block, LANES};
+use super::quad::{Quad, angle_over_sine};
+use crate::bvh::simd::{Job, Simd};
+use glam::Vec3;
+
+/// Most corners of a piece: four, and one for each plane that cut it.
+const CORNERS: usize = 8;
+/// So many pieces may come of one lamp at one point.
+const PIECES: u32 = 64;
+
+/// Something convex that is in the way: a triangle, without what is behind the lamp's plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blocker {
+    corners: [Vec3; 4],
+    count: usize,
+}
+
+/// A convex polygon as seen from a point, by its corners relative to it.
+#[derive(Clone, Copy)]
+struct Piece {
+    corners: [Vec3; CORNERS],
+    count: usize,
+}
+
+impl Blocker {
+    /// What of the triangle is above the plane through `on` with `normal` by more than `tolerance`, in units of both; `None`
+    /// if nothing is.
+    #[must_use]
+    pub fn new(triangle: &[Vec3; 3], on: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
+        let mut piece = Piece { count: 3, ..Piece::EMPTY };
+        piece.corners[..3].copy_from_slice(&triangle.map(|p| p - on));
+        if !piece.corners[..3].iter().any(|p| normal.dot(*p) > tolerance) {
+            return None;
+        }
+        let above = piece.inside(normal);
+        let mut corners = [Vec3::ZERO; 4];
+        let count = above.count.min(4);
+        for (to, from) in corners.iter_mut().zip(&above.corners[..count]) {
+            *to = *from + on;
+        }
+        (count > 2).then_some(Self { corners, count })
+    }
+}
+
+/// Makes one of each two triangles that make a flat convex quadrilateral: most that people build are made of such.
+pub fn join(blockers: &mut Vec<Blocker>, first: usize) {
+    let mut i = first;
+    while i < blockers.len() {
+        if let Some((k, joined)) =
+            (i + 1..blockers.len()).find_map(|k| Some((k, blockers[i].joined(&blockers[k])?)))
+        {
+            blockers[i] = joined;
+            blockers.swap_remove(k);
+        }
+        i += 1;
+    }
+}
+
+/// Irradiance at `point` with the first of `normals` from radiance 1 of what of `quad` is above both horizons and behind
+/// none of those `blockers` whose bits are set in `which`. `None` if it would be in too many pieces.
+#[must_use]
+pub fn irradiance(
+    quad: &Quad,
+    point: Vec3,
+    normals: [Vec3; 2],
+    blockers: &[Blocker],
+    which: u32,
+) -> Option<f32> {
+    let [normal, geometric] = normals;
+    let mut piece = Piece { count: 4, ..Piece::EMPTY };
+    for (to, corner) in piece.corners.iter_mut().zip(quad.corners()) {
+        *to = corner - point;
+    }
+    let mut budget = PIECES;
+    piece = piece.inside(normal);
+    if geometric != normal {
+        piece = piece.inside(geometric);
+    }
+    let sum = seen(piece, normal, point, blockers, which, &mut budget);
+    (budget > 0).then_some(sum.abs())
+}
+
+/// From what of `piece` is behind none of `blockers`.
+fn seen(
+    mut piece: Piece,
+    normal: Vec3,
+    point: Vec3,
+    blockers: &[Blocker],
+    mut which: u32,
+    budget: &mut u32,
+) -> f32 {
+    if piece.count < 3 || *budget == 0 {
+        return 0.0;
+    }
+    while which != 0 {
+        let blocker = &blockers[which.trailing_zeros() as usize];
+        which &= which - 1;
+        let mut planes = [Vec3::ZERO; 4];
+        // Outside of one of them is out of its reach: most are.
+        if !blocker.reaches(&piece, point, &mut planes) {
+            continue;
+        }
+        let mut sum = 0.0;
+        for plane in &planes[..blocker.count] {
+            let (mut inside, mut outside) = (Piece::EMPTY, Piece::EMPTY);
+            piece.split(*plane, &mut inside, &mut outside);
+            if outside.count > 2 {
+                piece = inside;
+                *budget =
+                    budget.saturating_sub(if outside.is_full() || piece.is_full() { PIECES } else { 1 });
+                sum += seen(outside, normal, point, blockers, which, budget);
+                if piece.count < 3 {
+                    break;
+                }
+            }
+        }
+        // What is inside of all of them is hidden.
+        return sum;
+    }
+    piece.irradiance(normal)
+}
+
+/// Which of some blockers may hide some of a lamp from each point of a block.
+pub struct Reach<'a> {
+    /// The points.
+    pub block: &'a Block,
+    /// The lamp.
+    pub quad: &'a Quad,
+    /// No more than 32.
+    pub blockers: &'a [Blocker],
+    /// A bit for each of them; all are set where one hides all of it.
+    pub out: &'a mut [u32; LANES],
+}
+
+/// All of a lamp is hidden.
+pub const HIDDEN: u32 = u32::MAX;
+
+impl Job for Reach<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { block, quad, blockers, out } = self;
+        let lamp = quad.corners();
+        *out = [0; LANES];
+        for (number, blocker) in (0..u32::BITS).zip(blockers) {
+            let [a, b, c, d] = blocker.corners;
+            let triangle = blocker.count == 3;
+            for (i, which) in out.iter_mut().enumerate() {
+                let point = block.position.get(i);
+                let (a, b, c, d) = (a - point, b - point, c - point, d - point);
+                let lamp = [lamp[0] - point, lamp[1] - point, lamp[2] - point, lamp[3] - point];
+                let first = a.cross(b);
+                let side = first.dot(c);
+                let sign = if side > 0.0 { 1.0 } else { -1.0 };
+                let (out_0, in_0) = sides(first * sign, &lamp);
+                let (out_1, in_1) = sides(b.cross(c) * sign, &lamp);
+                let (out_2, in_2) = sides(c.cross(if triangle { a } else { d }) * sign, &lamp);
+                let (out_3, in_3) = sides(d.cross(a) * sign, &lamp);
+                let outside = (out_0 | out_1 | out_2 | (out_3 & !triangle)) | (side == 0.0);
+                let inside = in_0 & in_1 & in_2 & (in_3 | triangle) & !outside;
+                let bit = if outside { 0 } else { 1 << number };
+                *which |= if inside { HIDDEN } else { bit };
+            }
+        }
+    }
+}
+
+/// Whether all of a lamp is outside of a plane, and whether all is inside.
+#[inline(always)]
+fn sides(plane: Vec3, lamp: &[Vec3; 4]) -> (bool, bool) {
+    let (a, b, c, d) = (plane.dot(lamp[0]), plane.dot(lamp[1]), plane.dot(lamp[2]), plane.dot(lamp[3]));
+    ((a <= 0.0) & (b <= 0.0) & (c <= 0.0) & (d <= 0.0), (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0))
+}
+
+impl Blocker {
+    /// Both in one, if they are triangles that make a flat convex quadrilateral.
+    fn joined(&self, other: &Self) -> Option<Self> {
+        if self.count != 3 || other.count != 3 {
+            return None;
+        }
+        // a and b of this one's edge, from any of its corners on; the other has it the other way round or the same.
+        (0..3).find_map(|i| {
+            let [a, b, c] = [0, 1, 2].map(|k| self.corners[(i + k) % 3]);
+            let third = other.corners[..3].iter().find(|p| **p != a && **p != b)?;
+            let shared = |p: Vec3| other.corners[..3].contains(&p);
+            if !shared(a) || !shared(b) {
+                return None;
+            }
+            let corners = [a, *third, b, c];
+            let turns = [0, 1, 2, 3].map(|k| {
+                let [p, q, r] = [0, 1, 2].map(|m| corners[(k + m) % 4].as_dvec3());
+                (q - p).cross(r - q)
+            });
+            let normal = turns[1];
+            // The fourth corner is as near to the others' plane as f32 can say, and all turns go one way.
+            let off = normal.dot((third - a).as_dvec3()).abs();
+            let size = normal.length() * (c - a).as_dvec3().length();
+            let flat = turns.iter().all(|turn| turn.dot(normal) > 0.0) && off <= 1e-6 * size;
+            flat.then_some(Self { corners, count: 4 })
+        })
+    }
+
+    /// Whether it may hide some of the piece. Then `planes` are the inward normals of those through `point` and its
+    /// edges.
+    fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; 4]) -> bool {
+        let [a, b, c, d] = self.corners.map(|p| p - point);
+        let first = a.cross(b);
+        let side = first.dot(c);
+        // Seen edge-on.
+        if side == 0.0 {
+            return false;
+        }
+        let sign = side.signum();
+        planes[0] = first * sign;
+        if piece.is_outside(planes[0]) {
+            return false;
+        }
+        planes[1] = b.cross(c) * sign;
+        if piece.is_outside(planes[1]) {
+            return false;
+        }
+        if self.count == 3 {
+            planes[2] = c.cross(a) * sign;
+            return !piece.is_outside(planes[2]);
+        }
+        planes[2] = c.cross(d) * sign;
+        planes[3] = d.cross(a) * sign;
+        !piece.is_outside(planes[2]) && !piece.is_outside(planes[3])
+    }
+}
+
+impl Piece {
+    const EMPTY: Self = Self { corners: [Vec3::ZERO; CORNERS], count: 0 };
+
+    /// Whether no corner is inside.
+    #[inline]
+    fn is_outside(&self, plane: Vec3) -> bool {
+        self.corners[..self.count].iter().all(|p| plane.dot(*p) <= 0.0)
+    }
+
+    /// What is on the side to which `plane`, a normal, points.
+    fn inside(&self, plane: Vec3) -> Self {
+        let (mut inside, mut outside) = (Self::EMPTY, Self::EMPTY);
+        self.split(plane, &mut inside, &mut outside);
+        inside
+    }
+
+    /// Adds what is on the side to which `plane`, a normal, points, and what is on the other, to two empty pieces. They
+    /// have the corners in the plane in common.
+    ///
+    /// Reference: I. E. Sutherland, G. W. Hodgman, "Reentrant Polygon Clipping", CACM 17(1), 1974.
+    fn split(&self, plane: Vec3, inside: &mut Self, outside: &mut Self) {
+        let Some(&last) = self.corners[..self.count].last() else { return };
+        let mut before = last;
+        let mut height_before = plane.dot(before);
+        for &here in &self.corners[..self.count] {
+            let height = plane.dot(here);
+            if (height > 0.0) != (height_before > 0.0) {
+                let crossing = before + (here - before) * (height_before / (height_before - height));
+                inside.push(crossing);
+                outside.push(crossing);
+            }
+            if height > 0.0 {
+                inside.push(here);
+            } else {
+                outside.push(here);
+            }
+            (before, height_before) = (here, height);
+        }
+    }
+
+    /// Perhaps too many corners for it.
+    fn is_full(&self) -> bool {
+        self.count == CORNERS
+    }
+
+    fn push(&mut self, corner: Vec3) {
+        if self.count < CORNERS {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
+    }
+
+    /// By the sum over its edges; its sign is that of the corners' sense of rotation.
+    fn irradiance(&self, normal: Vec3) -> f32 {
+        let corners = &self.corners[..self.count];
+        let mut before = corners[self.count - 1];
+        let mut length_before = before.length();
+        let mut sum = 0.0;
+        for &here in corners {
+            let length = here.length();
+            let scale = 1.0 / (length_before * length);
+            let cross = before.cross(here - before);
+            sum += normal.dot(cross) * scale * angle_over_sine(before.dot(here) * scale);
+            (before, length_before) = (here, length);
+        }
+        0.5 * sum
+    }
+}
