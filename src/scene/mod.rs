@@ -8,6 +8,7 @@ pub mod bounds;
 pub mod camera;
 pub mod color;
 pub mod deform;
+pub mod layers;
 pub mod light;
 pub mod material;
 pub mod mesh;
@@ -18,8 +19,9 @@ pub use animation::{Animation, Channel, Curve, Interpolation, MorphWeights, Play
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Projection};
 pub use deform::{Deform, Influences, Skin, Target, deform};
+pub use layers::{Anisotropy, Body, Clearcoat, Layers, Sheen, Transmission};
 pub use light::{Emission, Light, Visible};
-pub use material::{Alpha, Glass, Glossy, Material, TextureUse};
+pub use material::{Alpha, Glass, Glossy, Material, NormalMap, TextureUse};
 pub use mesh::{Instance, Mesh, TriangleMesh};
 pub use texture::{Encoding, Filter, Texels, Texture, Wrap};
 pub use transform::{GlobalTransform, Transform, propagate_transforms};
