@@ -5,109 +5,26 @@
     reason = "a test shows its figures, and fails at the first wrong one"
 )]
 
+#[path = "support/chi_square.rs"]
+mod chi_square;
 #[path = "support/stage.rs"]
 mod stage;
 
-use glam::{DAffine3, DVec3, UVec2, Vec2, Vec3, Vec4};
+use chi_square::{SAMPLES, sampler_against_density};
+
+use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::{FrameBudget, FrameStats};
 use penumbra::bvh::Ray;
-use penumbra::scene::{Glossy, Light, Material};
-use penumbra::trace::bsdf::{Bsdf, Lobes};
+use penumbra::scene::{Light, Material};
 use penumbra::trace::film::Pixel;
 use penumbra::trace::light::FlatLight;
 use penumbra::trace::mesh_light::MeshLight;
 use penumbra::trace::noise::relative_error;
 use penumbra::trace::quad::Quad;
-use penumbra::trace::scene::Surface;
 use penumbra::trace::shape_light::{Shape, ShapeLight};
-use penumbra::trace::surface::Interaction;
 use penumbra::trace::{Integrator, RenderSettings};
 use stage::{Estimate, Rng, Stage, quad, reds, settings};
 use std::f64::consts::PI;
-
-const CELLS: usize = 16;
-const SAMPLES: usize = 100_000;
-/// Tests of this file that ask for a χ²; the level of each is such that all together have 1 %.
-const TESTS: f64 = 60.0;
-
-/// P(Z > z) of the normal distribution, by Simpson's rule.
-fn normal_tail(z: f64) -> f64 {
-    let n = 2000;
-    let h = 12.0 / f64::from(n);
-    let f = |i: i32| (-0.5 * (z + f64::from(i) * h).powi(2)).exp();
-    let sum: f64 = (0..n / 2).map(|i| f(2 * i) + 4.0 * f(2 * i + 1) + f(2 * i + 2)).sum();
-    sum * h / 3.0 / (2.0 * PI).sqrt()
-}
-
-/// Panics if `seen` counts are too unlikely under the `expected` ones (Wilson and Hilferty, 1931).
-fn chi_square(name: &str, seen: &[f64], expected: &[f64]) {
-    let (mut chi2, mut cells, mut rare_seen, mut rare_expected) = (0.0, 0.0f64, 0.0, 0.0);
-    for (s, e) in seen.iter().zip(expected) {
-        if *e >= 8.0 {
-            chi2 += (s - e).powi(2) / e;
-            cells += 1.0;
-        } else {
-            rare_seen += s;
-            rare_expected += e;
-        }
-    }
-    if rare_expected >= 8.0 {
-        chi2 += (rare_seen - rare_expected).powi(2) / rare_expected;
-        cells += 1.0;
-    } else {
-        assert!(rare_seen <= rare_expected + 30.0, "{name}: {rare_seen} where {rare_expected} are expected");
-    }
-    assert!(cells > 1.0, "{name}: nothing to compare");
-    let k = 2.0 / (9.0 * (cells - 1.0));
-    let z = ((chi2 / (cells - 1.0)).cbrt() - (1.0 - k)) / k.sqrt();
-    let p = normal_tail(z);
-    let level = 1.0 - 0.99f64.powf(1.0 / TESTS);
-    println!("{name}: χ² {chi2:.0} of {cells} cells, p = {p:.2e}");
-    assert!(p > level, "{name}: χ² {chi2} of {cells} cells, p = {p:e} < {level:e}");
-}
-
-/// A sampler against its density, on cells of a unit square that is mapped onto directions.
-///
-/// `direction` gives the direction at a place of the square and the solid angle per area there;
-/// `place` is its inverse.
-fn sampler_against_density(
-    name: &str,
-    samples: usize,
-    mut sample: impl FnMut(&mut Rng) -> Option<Vec3>,
-    density: impl Fn(Vec3) -> f64,
-    direction: impl Fn(f64, f64) -> (DVec3, f64),
-    place: impl Fn(DVec3) -> (f64, f64),
-) {
-    let n = CELLS * CELLS;
-    // The last cell counts what was not proposed at all.
-    let mut seen = vec![0.0; n + 1];
-    let mut rng = Rng(12);
-    for _ in 0..samples {
-        let cell = sample(&mut rng).map_or(n, |wi| {
-            let (a, b) = place(wi.as_dvec3());
-            let index = |x: f64| ((x * CELLS as f64) as usize).min(CELLS - 1);
-            index(a) * CELLS + index(b)
-        });
-        seen[cell] += 1.0;
-    }
-    const FINE: usize = 32;
-    let mut expected: Vec<f64> = (0..n)
-        .map(|cell| {
-            let (i, j) = (cell / CELLS, cell % CELLS);
-            let mut sum = 0.0;
-            for (k, l) in (0..FINE).flat_map(|k| (0..FINE).map(move |l| (k, l))) {
-                let at = |i: usize, k: usize| (i as f64 + (k as f64 + 0.5) / FINE as f64) / CELLS as f64;
-                let (wi, area) = direction(at(i, k), at(j, l));
-                sum += if area > 0.0 { density(wi.as_vec3()) * area } else { 0.0 };
-            }
-            sum / ((FINE * FINE * CELLS * CELLS) as f64) * samples as f64
-        })
-        .collect();
-    let total: f64 = expected.iter().sum::<f64>() / samples as f64;
-    assert!(total < 1.002, "{name}: the density integrates to {total}");
-    expected.push((1.0 - total).max(0.0) * samples as f64);
-    chi_square(&format!("{name} (∫ = {total:.5})"), &seen, &expected);
-}
 
 const POINT: Vec3 = Vec3::new(0.2, -0.1, 0.05);
 
@@ -276,85 +193,6 @@ fn each_light_is_sampled_as_its_density_says() {
         direction,
         place,
     );
-}
-
-/// A material at a point of a floor whose normal is +Z.
-fn bsdf(material: Material) -> Bsdf {
-    let mut stage = Stage::new(settings(1, 1, Integrator::Path, 1));
-    stage.trace(1);
-    let at = Interaction {
-        position: Vec3::ZERO,
-        error: Vec3::ZERO,
-        geometric_normal: Vec3::Z,
-        normal: Vec3::Z,
-        uv: Vec2::ZERO,
-        color: Vec4::ONE,
-        front: true,
-    };
-    Bsdf::new(&stage.scene(), &Surface::from(material), &at)
-}
-
-#[test]
-fn each_material_is_sampled_as_its_density_says() {
-    let ggx = |metallic, roughness| Glossy::Ggx { metallic, roughness, texture: None };
-    let phong = |exponent| Glossy::BlinnPhong { specular: Vec3::splat(0.7), exponent };
-    // `width`: tangent of the typical angle between the normal and the half vector.
-    for (name, glossy, albedo, width) in [
-        ("Lambert", Glossy::None, 0.8, 1.0),
-        ("GGX of roughness 0.05", ggx(1.0, 0.05), 0.8, 0.0025),
-        ("GGX of roughness 0.1", ggx(1.0, 0.1), 0.8, 0.01),
-        ("GGX of roughness 0.3", ggx(1.0, 0.3), 0.8, 0.09),
-        ("GGX of roughness 1", ggx(1.0, 1.0), 0.8, 1.0),
-        ("GGX over Lambert", ggx(0.0, 0.5), 0.5, 0.5),
-        ("Blinn-Phong of exponent 1", phong(1.0), 0.0, 1.0),
-        ("Blinn-Phong of exponent 50", phong(50.0), 0.0, 0.2),
-        ("Blinn-Phong over Lambert", phong(5.0), 0.4, 0.6),
-    ] {
-        let bsdf = bsdf(Material { glossy, ..Material::lambert(Vec3::splat(albedo)) });
-        for degrees in [0.0, 30.0, 60.0, 80.0, 89.9f64] {
-            let eye = DVec3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
-            let wo = eye.as_vec3().normalize();
-            // The horizon of a grazing eye runs through the middle of cells, not along their borders.
-            let turn = 0.5 / CELLS as f64;
-            // Half vectors by tangent over width and by angle: a smooth density for a narrow lobe too.
-            let direction = |a: f64, b: f64| {
-                let tan = width * a / (1.0 - a);
-                let cos = 1.0 / (1.0 + tan * tan).sqrt();
-                let phi = 2.0 * PI * (b + turn);
-                let h = DVec3::new(tan * phi.cos(), tan * phi.sin(), 1.0) * cos;
-                let v_dot_h = h.dot(eye);
-                // d tan / da, then solid angle of h over d tan, then that of wi over that of h.
-                let area = width / (1.0 - a).powi(2) * tan * cos.powi(3) * 2.0 * PI * 4.0 * v_dot_h;
-                (h * (2.0 * v_dot_h) - eye, area)
-            };
-            let place = |wi: DVec3| {
-                let h = (wi + eye).normalize();
-                let tan = h.x.hypot(h.y) / h.z;
-                (tan / (width + tan), (h.y.atan2(h.x) / (2.0 * PI) - turn).rem_euclid(1.0))
-            };
-            let sample = |rng: &mut Rng| {
-                let sample = bsdf.sample(wo, rng.unit(), rng.pair(), Lobes::ALL)?;
-                let pdf = bsdf.pdf(wo, sample.wi, Lobes::ALL);
-                assert_eq!(sample.pdf, Some(pdf));
-                let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
-                let off = (sample.weight * pdf - (diffuse + glossy)).abs().max_element();
-                assert!(off <= 1e-5 * (diffuse + glossy).max_element(), "weight is not value over density");
-                Some(sample.wi)
-            };
-            // There one step of a direction's largest component is 0.7 % of the whole lobe: more samples
-            // would see the steps of single precision.
-            let samples = if width < 0.005 && degrees > 89.0 { SAMPLES / 8 } else { SAMPLES };
-            let density = |wi: Vec3| f64::from(bsdf.pdf(wo, wi, Lobes::ALL));
-            sampler_against_density(
-                &format!("{name} at {degrees}°"),
-                samples,
-                sample,
-                density,
-                direction,
-                place,
-            );
-        }
-    }
 }
 
 #[test]

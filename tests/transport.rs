@@ -101,7 +101,7 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
         cases.push((format!("metal of roughness {roughness}"), Material { glossy, ..white.clone() }));
     }
     for exponent in [0.0, 1.0, 10.0, 50.0, 1000.0] {
-        let glossy = Glossy::BlinnPhong { specular: Vec3::ONE, exponent };
+        let glossy = Glossy::BlinnPhong { specular: Vec3::ONE, exponent, texture: None };
         cases.push((format!("Blinn-Phong of exponent {exponent}"), Material { glossy, ..black.clone() }));
     }
     for (name, material) in cases {
@@ -115,13 +115,6 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
         }
         println!("{name}: lost at {ANGLES:?} rad:{line}");
     }
-    // At roughness 1 the loss has a closed form: c ln((1 + c) / c) at cosine c.
-    for angle in ANGLES {
-        let glossy = Glossy::Ggx { metallic: 1.0, roughness: 1.0, texture: None };
-        let e = plane_under_a_white_sky(Material { glossy, ..white.clone() }, angle, 1024);
-        let c = angle.cos();
-        e.assert_is(&format!("metal of roughness 1 at {angle}"), 1.0 - c * ((1.0 + c) / c).ln(), 2e-3);
-    }
     for roughness in [0.1, 0.5, 1.0] {
         let glossy = Glossy::Ggx { metallic: 1.0, roughness, texture: None };
         let e = Estimate::of(&furnace(Material { glossy, ..white.clone() }, 8, 64));
@@ -129,7 +122,7 @@ fn glossy_surfaces_never_send_back_more_than_they_get() {
     }
 }
 
-/// Base and coat together: the base gets what the coat lets through, at the flatter of both directions.
+/// Base and interface together: what the interface does not send back, the white base does.
 #[test]
 fn a_gltf_dielectric_never_sends_back_more_than_it_gets() {
     for roughness in [0.1, 0.5, 1.0] {
@@ -139,7 +132,7 @@ fn a_gltf_dielectric_never_sends_back_more_than_it_gets() {
         let means = sums.map(|s| s.mean);
         println!("white dielectric of roughness {roughness}: {means:.3?}");
         assert!(sums.iter().all(|s| s.mean <= 1.0 + 4.5 * s.sigma), "{means:?}");
-        assert!(means[..3].iter().all(|m| *m > 0.85), "{means:?}");
+        assert!(means[..4].iter().all(|m| *m > 0.995), "{means:?}");
     }
 }
 
@@ -170,17 +163,16 @@ fn every_way_of_sampling_finds_the_same_light() {
     let (instance, surface) = scene.surface_at(&hit);
     let at = Interaction::new(&scene, instance, &hit, &ray);
     let bsdf = at.bsdf(&scene, surface);
-    let wo = -ray.direction;
     let mut rng = Rng(1);
     let (mut by_light, mut by_bounce) = (Vec::new(), Vec::new());
     for _ in 0..256 {
         let (mut light_sum, mut bounce_sum) = (0.0, 0.0);
         for _ in 0..8192 {
             if let Some(sample) = scene.lights.get(0).sample(at.position, bsdf.normal(), rng.pair()) {
-                let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
+                let [diffuse, glossy] = bsdf.eval(sample.wi);
                 light_sum += f64::from(((diffuse + glossy) * sample.radiance).x / sample.pdf.unwrap());
             }
-            if let Some(sample) = bsdf.sample(wo, rng.unit(), rng.pair(), Lobes::ALL) {
+            if let Some(sample) = bsdf.sample(rng.unit(), rng.pair(), Lobes::ALL) {
                 let ray = Ray::new(at.origin_toward(sample.wi), sample.wi);
                 if let Some(found) = scene.lights.closest(&ray) {
                     bounce_sum += f64::from((sample.weight * found.shape.emitted(&ray, &found.hit)).x);
@@ -211,7 +203,7 @@ fn direct_light_is_the_path_tracers_first_bounce_with_every_kind_of_light() {
         let mut stage = Stage::new(settings(64, 64, integrator, 1));
         let floor = |glossy, albedo: f32| Material { glossy, ..Material::lambert(Vec3::splat(albedo)) };
         let ggx = Glossy::Ggx { metallic: 0.2, roughness: 0.3, texture: None };
-        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.4), exponent: 20.0 };
+        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.4), exponent: 20.0, texture: None };
         stage.add_mesh(quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0), floor(ggx, 0.7), HERE);
         let place = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
         stage.add_mesh(ball(12), floor(phong, 0.4), place(0.0, 1.0, 0.0));

@@ -77,12 +77,14 @@ impl Fingerprint {
         for surface in &scene.surfaces.materials {
             // Its entities are only names; the textures are told by their numbers.
             let mut material = surface.material.clone();
-            (material.base_color_texture, material.emission_texture) = (None, None);
-            if let Glossy::Ggx { texture, .. } = &mut material.glossy {
+            (material.base_color_texture, material.emission_texture, material.normal_map) =
+                (None, None, None);
+            if let Glossy::Ggx { texture, .. } | Glossy::BlinnPhong { texture, .. } = &mut material.glossy {
                 *texture = None;
             }
             print.debug(&material);
             print.debug(&[surface.base_color_texture, surface.glossy_texture, surface.emission_texture]);
+            print.debug(&(&surface.normal_map, &surface.layers));
         }
         for texture in &scene.surfaces.textures {
             print.debug(&(texture.texels.width, texture.texels.height));
@@ -103,10 +105,12 @@ impl Fingerprint {
     }
 
     fn mesh(&mut self, mesh: &TriangleMesh) {
-        let TriangleMesh { positions, normals, uvs, colors, triangles, slots } = mesh;
+        let TriangleMesh { positions, normals, uvs, second_uvs, tangents, colors, triangles, slots } = mesh;
         self.bytes(bytemuck::cast_slice(positions));
         self.bytes(bytemuck::cast_slice(normals));
         self.bytes(bytemuck::cast_slice(uvs));
+        self.bytes(bytemuck::cast_slice(second_uvs));
+        self.bytes(bytemuck::cast_slice(tangents));
         self.bytes(bytemuck::cast_slice(colors));
         self.bytes(bytemuck::cast_slice(triangles));
         self.bytes(bytemuck::cast_slice(slots));

@@ -13,6 +13,8 @@ pub(super) struct Part {
     pub(super) positions: Vec<Vec3>,
     pub(super) normals: Option<Vec<Vec3>>,
     pub(super) uvs: Option<Vec<Vec2>>,
+    pub(super) second_uvs: Option<Vec<Vec2>>,
+    pub(super) tangents: Option<Vec<Vec4>>,
     pub(super) colors: Option<Vec<Vec4>>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) slot: u16,
@@ -74,6 +76,8 @@ pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
     let parts = faceted_beside_smooth(parts);
     let any_normals = parts.iter().any(|part| part.normals.is_some());
     let any_uvs = parts.iter().any(|part| part.uvs.is_some());
+    let any_second_uvs = parts.iter().any(|part| part.second_uvs.is_some());
+    let any_tangents = parts.iter().any(|part| part.tangents.is_some());
     let any_colors = parts.iter().any(|part| part.colors.is_some());
     let several_slots = parts.iter().any(|part| part.slot != 0);
     let mut mesh = TriangleMesh::default();
@@ -91,6 +95,12 @@ pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
         if any_uvs {
             mesh.uvs.extend(part.uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
         }
+        if any_second_uvs {
+            mesh.second_uvs.extend(part.second_uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
+        }
+        if any_tangents {
+            mesh.tangents.extend(part.tangents.unwrap_or_else(|| vec![Vec4::ZERO; count]));
+        }
         if any_colors {
             mesh.colors.extend(part.colors.unwrap_or_else(|| vec![Vec4::ONE; count]));
         }
@@ -107,6 +117,9 @@ fn faceted(part: &Part) -> Part {
     Part {
         normals: Some(normals),
         uvs: part.uvs.as_ref().map(|uvs| corners().map(|corner| uvs[corner]).collect()),
+        second_uvs: part.second_uvs.as_ref().map(|uvs| corners().map(|corner| uvs[corner]).collect()),
+        // Tangents without normals don't count (glTF 2.0 specification, 3.7.2.1).
+        tangents: None,
         colors: part.colors.as_ref().map(|colors| corners().map(|corner| colors[corner]).collect()),
         triangles: (0..part.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         positions,
@@ -133,11 +146,16 @@ pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
     mended.too_far = retain(&mut mesh, |corners| corners.iter().all(|p| p.abs().max_element() <= FAR));
     mended.without_area = if keep_flat { 0 } else { mesh.drop_degenerate() };
     mend_normals(&mut mesh, &mut mended);
-    for uv in &mut mesh.uvs {
+    for uv in mesh.uvs.iter_mut().chain(&mut mesh.second_uvs) {
         if !uv.is_finite() {
             *uv = Vec2::ZERO;
             mended.uvs += 1;
         }
+    }
+    for tangent in &mut mesh.tangents {
+        let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+        // What has no direction is made later, where a normal map needs it.
+        *tangent = tangent.truncate().try_normalize().map_or(Vec4::ZERO, |t| t.extend(side));
     }
     for color in &mut mesh.colors {
         if !color.is_finite() {

@@ -22,6 +22,7 @@ mod picture;
 mod report;
 pub mod settings;
 mod source;
+mod tangents;
 
 pub use builtin::{BuiltIn, built_in_scenes};
 pub use card::{Card, Verdict};

@@ -86,6 +86,16 @@ impl Deform {
             add(&mut mesh.positions, &target.positions, weight);
             add(&mut mesh.normals, &target.normals, weight);
         }
+        if let (Some(skin), Some(matrices)) = (&self.skin, mesh_from_bind) {
+            mesh.tangents.par_iter_mut().enumerate().for_each(|(i, tangent)| {
+                if let Some(carrier) = skin.influences.carrier(i, matrices) {
+                    let turned =
+                        (carrier.matrix3 * tangent.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+                    // A mirroring pose turns the cross product of normal and tangent round.
+                    *tangent = turned.extend(tangent.w * carrier.matrix3.determinant().signum() as f32);
+                }
+            });
+        }
         let mut no_normals = vec![Vec3::ZERO; if mesh.normals.is_empty() { mesh.positions.len() } else { 0 }];
         let normals = if mesh.normals.is_empty() { &mut no_normals } else { &mut mesh.normals };
         let vertices = mesh.positions.par_iter_mut().zip(normals.par_iter_mut()).enumerate();

@@ -1,5 +1,6 @@
 //! What surfaces are made of.
 
+use super::Layers;
 use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec3};
 
@@ -14,6 +15,10 @@ pub struct Material {
     pub base_color_texture: Option<TextureUse>,
     /// The glossy lobe.
     pub glossy: Glossy,
+    /// What extensions add to [`Glossy::Ggx`].
+    pub layers: Option<Box<Layers>>,
+    /// Tilts the shading normal.
+    pub normal_map: Option<NormalMap>,
     /// Reflectance of a perfect mirror on top (MTL `illum 3`, `5`).
     pub mirror: Vec3,
     /// Perfectly smooth glass body: index of refraction above 1 and a tint of what passes.
@@ -43,6 +48,8 @@ pub enum Glossy {
         specular: Vec3,
         /// Exponent, 0 or more.
         exponent: f32,
+        /// Its colour multiplies `specular`, its alpha `exponent`.
+        texture: Option<TextureUse>,
     },
     /// glTF metallic-roughness, GGX with Smith masking: glTF 2.0 specification, appendix B.
     Ggx {
@@ -82,11 +89,30 @@ pub struct TextureUse {
     pub texture: Entity,
     /// `texture_from_mesh` coordinates (`KHR_texture_transform`, MTL `-s -o`).
     pub uv_transform: Affine2,
+    /// Whether it lies on the mesh's second set of coordinates ([`super::TriangleMesh::second_uvs`]).
+    pub second_uvs: bool,
+}
+
+/// A texture of directions in the frame of tangent, bitangent and normal: red, green and blue from 0 to 1
+/// are −1 to 1. `T` names the texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalMap<T = TextureUse> {
+    /// The directions; linear.
+    pub texture: T,
+    /// Multiplies what is along tangent and bitangent.
+    pub scale: f32,
+}
+
+impl<T> NormalMap<T> {
+    /// The same with another name for the texture; without one it is gone.
+    pub fn renamed<U>(self, name: impl FnOnce(T) -> Option<U>) -> Option<NormalMap<U>> {
+        name(self.texture).map(|texture| NormalMap { texture, scale: self.scale })
+    }
 }
 
 impl From<Entity> for TextureUse {
     fn from(texture: Entity) -> Self {
-        Self { texture, uv_transform: Affine2::IDENTITY }
+        Self { texture, uv_transform: Affine2::IDENTITY, second_uvs: false }
     }
 }
 
@@ -97,6 +123,8 @@ impl Default for Material {
             base_color: Vec3::splat(0.8),
             base_color_texture: None,
             glossy: Glossy::None,
+            layers: None,
+            normal_map: None,
             mirror: Vec3::ZERO,
             glass: None,
             emission: Vec3::ZERO,

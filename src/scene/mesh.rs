@@ -19,6 +19,11 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, origin at the top left (glTF): one a vertex, or empty.
     pub uvs: Vec<Vec2>,
+    /// A second set of them, for textures that say so: one a vertex, or empty.
+    pub second_uvs: Vec<Vec2>,
+    /// Unit direction of growing u for normal maps, and in w the side of the bitangent w · (normal × tangent):
+    /// one a vertex, zero where there is none; or empty.
+    pub tangents: Vec<Vec4>,
     /// Linear RGBA factors on the base colour: one a vertex, or empty.
     pub colors: Vec<Vec4>,
     /// Vertex indices, each below `positions.len()`.
@@ -41,6 +46,22 @@ impl TriangleMesh {
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         let [a, b, c] = self.triangles[triangle];
         [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
+    }
+
+    /// Adds a vertex that is in everything like `vertex`; returns its index.
+    pub fn duplicate(&mut self, vertex: u32) -> u32 {
+        fn again<T: Copy>(attribute: &mut Vec<T>, vertex: u32) {
+            if let Some(&value) = attribute.get(vertex as usize) {
+                attribute.push(value);
+            }
+        }
+        again(&mut self.positions, vertex);
+        again(&mut self.normals, vertex);
+        again(&mut self.uvs, vertex);
+        again(&mut self.second_uvs, vertex);
+        again(&mut self.tangents, vertex);
+        again(&mut self.colors, vertex);
+        self.positions.len() as u32 - 1
     }
 
     /// Drops triangles with no area or with a corner that is not finite; returns how many.

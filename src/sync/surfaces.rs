@@ -1,7 +1,8 @@
 //! Materials and textures → numbered surfaces.
 
 use super::Redone;
-use crate::scene::{Alpha, Encoding, Filter, Glossy, Material, Texels, Texture, TextureUse, Wrap};
+use crate::scene::{Alpha, Encoding, Filter, Glossy, Layers, Material, Texels, Texture, TextureUse, Wrap};
+use crate::trace::bsdf::Passed;
 use crate::trace::scene::{Coverage, Surface, TextureIndex};
 use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
@@ -40,20 +41,34 @@ pub fn sync_surfaces(
     renumber(&mut numbers, materials.iter().map(|(e, _)| e).collect(), 1);
     renumber(&mut texture_numbers, textures.iter().map(|(e, _)| e).collect(), 0);
     let resolve = |texture: Option<TextureUse>| {
-        let TextureUse { texture, uv_transform } = texture?;
-        texture_numbers.get(&texture).map(|&index| TextureIndex { index, uv_transform })
+        let TextureUse { texture, uv_transform, second_uvs } = texture?;
+        texture_numbers.get(&texture).map(|&index| TextureIndex { index, uv_transform, second_uvs })
     };
+    // One table for all bodies of the same index.
+    let mut passed: HashMap<u32, Arc<Passed>> = HashMap::new();
     let room = |numbers: &HashMap<Entity, u32>| numbers.values().max().map_or(0, |&n| n as usize + 1);
     let mut list = vec![Surface::from(Material::default()); room(&numbers).max(1)];
     for (entity, material) in &materials {
+        let layers = material.layers.as_ref().map(|layers| layers.renamed(|texture| resolve(Some(texture))));
+        let is_body = |layers: &&Layers<TextureIndex>| {
+            layers.transmission.as_ref().is_some_and(|transmission| transmission.body.is_some())
+        };
+        let passed = layers.as_ref().filter(is_body).map(|layers| {
+            let table =
+                passed.entry(layers.ior.to_bits()).or_insert_with(|| Arc::new(Passed::new(layers.ior)));
+            Arc::clone(table)
+        });
         list[numbers[&entity] as usize] = Surface {
-            material: material.clone(),
+            material: Material { layers: None, ..material.clone() },
             base_color_texture: resolve(material.base_color_texture),
             glossy_texture: resolve(match material.glossy {
-                Glossy::Ggx { texture, .. } => texture,
-                _ => None,
+                Glossy::Ggx { texture, .. } | Glossy::BlinnPhong { texture, .. } => texture,
+                Glossy::None => None,
             }),
             emission_texture: resolve(material.emission_texture),
+            normal_map: material.normal_map.and_then(|map| map.renamed(|texture| resolve(Some(texture)))),
+            layers: layers.map(Box::new),
+            passed,
         };
     }
     // Numbers that are free for the moment show nothing.

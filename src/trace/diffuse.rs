@@ -3,6 +3,7 @@
 //! Where it is known what is in the way of a light, it is computed instead of sampled: no shadow rays, and no noise.
 
 use super::block::{Arrivals, Block, Depart, Departures, IntegrateQuad, LANES, SampleQuad};
+use super::bsdf::normal::facing;
 use super::film::Tile;
 use super::integrator::{
     Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, PICK, Path, ROULETTE_DEPTH, Shadow,
@@ -223,8 +224,9 @@ impl Batch {
                 block.weights.set(i, Vec3::new(hit.u, hit.v, 0.0));
                 block.direction.set(i, path.ray.direction);
             } else {
-                let at = Interaction::new(scene, instance, hit, &path.ray);
-                let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
+                let mut at = Interaction::new(scene, instance, hit, &path.ray);
+                at.normal = facing(at.normal, &at);
+                let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
                 albedo *= texel.truncate();
                 block.set_point(i, &at);
             }
@@ -367,6 +369,7 @@ impl Batch {
                 depth: depth + 1,
                 bounce: Some(Bounce { pdf, normal: block.normal.get(i), counted: self.diffuse.counted[i] }),
                 last: false,
+                absorption: Vec3::ZERO,
             });
         }
         self.diffuse.departures = out;

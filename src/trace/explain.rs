@@ -92,7 +92,16 @@ pub fn explain(scene: &TraceScene, pixel: UVec2, samples: Range<u32>, far: f32) 
             let sampler = halves[sample as usize & 1].at(sample);
             let ray = scene.viewpoint.ray(pixel.as_vec2() + sampler.pair(0), scene.settings.size);
             let ray = scene.viewpoint.through_lens(ray, sampler.pair(LENS));
-            Path { entry, sampler, ray, throughput: Vec3::ONE, depth: 0, bounce: None, last: false }
+            Path {
+                entry,
+                sampler,
+                ray,
+                throughput: Vec3::ONE,
+                depth: 0,
+                bounce: None,
+                absorption: Vec3::ZERO,
+                last: false,
+            }
         })
         .collect();
     let ray = paths.first().map(|path| path.ray);

@@ -137,7 +137,7 @@ fn first_surface(scene: &TraceScene, ray: &Ray, hit: Option<&Hit>) -> FirstSurfa
     let Some(hit) = hit else { return FirstSurface { depth: f32::INFINITY, ..FirstSurface::default() } };
     let (instance, surface) = scene.surface_at(hit);
     let at = Interaction::new(scene, instance, hit, ray);
-    let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
+    let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
     FirstSurface {
         depth: scene.viewpoint.depth(ray, hit.t),
         normal: at.normal,

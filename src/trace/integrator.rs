@@ -5,7 +5,7 @@
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
 use super::block::LANES;
-use super::bsdf::{Bsdf, Lobes};
+use super::bsdf::{Bsdf, Evaluated, Lobes};
 use super::camera::Look;
 use super::diffuse::Diffuse;
 use super::film::Tile;
@@ -32,6 +32,8 @@ pub(super) struct Path {
     pub(super) bounce: Option<Bounce>,
     /// Only collects what shines at its end.
     pub(super) last: bool,
+    /// Absorption coefficient of the body that the ray crosses; zero outside.
+    pub(super) absorption: Vec3,
 }
 
 /// The smooth bounce that a ray comes from.
@@ -208,6 +210,7 @@ impl Batch {
             depth: 0,
             bounce: None,
             last: false,
+            absorption: Vec3::ZERO,
         }
     }
 
@@ -255,7 +258,11 @@ impl Batch {
 
     /// What the end of a path's ray sends back along it, and where it goes on.
     fn arrive(&mut self, scene: &TraceScene, index: usize) {
-        let (path, hit) = (&self.path(index), self.hits[index]);
+        let (mut path, hit) = (self.path(index), self.hits[index]);
+        if let (true, Some(hit)) = (path.absorption != Vec3::ZERO, hit) {
+            path.throughput *= passed(path.absorption, hit.t * path.ray.direction.length());
+        }
+        let path = &path;
         let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
         let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
         if let Some(found) = may_meet.then(|| scene.lights.closest(&before_hit)).flatten() {
@@ -274,7 +281,8 @@ impl Batch {
             return;
         };
         let (instance, surface) = scene.surface_at(&hit);
-        if surface.is_diffuse() {
+        // Inside a body even the way from a light counts.
+        if surface.is_diffuse() && path.absorption == Vec3::ZERO {
             if !path.last && path.depth < scene.settings.max_depth {
                 self.diffuse.add(scene, index, &hit, path.depth);
             }
@@ -282,7 +290,7 @@ impl Batch {
         }
         let at = Interaction::new(scene, instance, &hit, &path.ray);
         if surface.material.unlit {
-            let texel = scene.texture(surface.base_color_texture, at.uv) * at.color;
+            let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
             let shown = surface.material.base_color * texel.truncate();
             self.radiance[path.entry as usize] += path.throughput * shown;
             return;
@@ -323,7 +331,6 @@ impl Batch {
     /// Queues shadow rays to lights, and the ray that goes on.
     pub(super) fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
         let bsdf = at.bsdf(scene, surface);
-        let wo = -path.ray.direction;
         let base = 1 + path.depth * PAIRS_PER_BOUNCE;
         // Direct lighting finds Lambert's share by light samples alone: no ray is spent on it.
         let followed = match scene.settings.integrator {
@@ -346,7 +353,7 @@ impl Batch {
             return;
         }
         let choice = path.sampler.pair(base + LOBE);
-        let Some(sample) = bsdf.sample(wo, choice.x, path.sampler.pair(base + DIRECTION), followed) else {
+        let Some(sample) = bsdf.sample(choice.x, path.sampler.pair(base + DIRECTION), followed) else {
             return;
         };
         let mut throughput = path.throughput * sample.weight;
@@ -357,7 +364,16 @@ impl Batch {
             }
             throughput /= survival;
         }
-        let smooth = sample.pdf.is_some();
+        let absorption = match surface.body() {
+            Some(body) if at.geometric_normal.dot(sample.wi) < 0.0 => {
+                if at.front {
+                    body.absorption
+                } else {
+                    Vec3::ZERO
+                }
+            }
+            _ => path.absorption,
+        };
         self.next.push(Path {
             entry: path.entry,
             sampler: path.sampler,
@@ -365,7 +381,8 @@ impl Batch {
             throughput,
             depth: path.depth + 1,
             bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal(), counted: 0 }),
-            last: smooth && scene.settings.integrator == Integrator::Direct,
+            last: !sample.follow && scene.settings.integrator == Integrator::Direct,
+            absorption,
         });
     }
 
@@ -384,13 +401,11 @@ impl Batch {
         chance: f32,
         sample: &LightSample,
     ) {
-        let wo = -path.ray.direction;
-        let [diffuse, glossy] = bsdf.eval(wo, sample.wi);
+        let Evaluated { diffuse, glossy, pdf: bounce_pdf } = bsdf.evaluate(sample.wi, followed);
         let weight = match sample.pdf {
             None => (diffuse + glossy) / chance,
             Some(pdf) => {
                 let light_pdf = pdf * chance;
-                let bounce_pdf = bsdf.pdf(wo, sample.wi, followed);
                 let shared = power_heuristic(light_pdf, bounce_pdf);
                 // What no bounce would find is the light samples' alone.
                 (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
@@ -399,6 +414,10 @@ impl Batch {
         let mut contribution = path.throughput * weight * sample.radiance;
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, sample);
+        }
+        if path.absorption != Vec3::ZERO && at.geometric_normal.dot(sample.wi) > 0.0 {
+            let distance = sample.target.map_or(f32::MAX, |target| target.distance(at.position));
+            contribution *= passed(path.absorption, distance);
         }
         if contribution == Vec3::ZERO {
             return;
@@ -424,14 +443,19 @@ impl Batch {
     }
 }
 
+/// What is left after that way (J. H. Lambert, "Photometria", 1760; A. Beer, 1852).
+fn passed(absorption: Vec3, distance: f32) -> Vec3 {
+    (-absorption * distance).exp()
+}
+
 /// Radiance of an emissive triangle at a sampled point.
 pub(super) fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
     let hit = Hit { t: 0.0, u: sample.uv.x, v: sample.uv.y, triangle, instance };
     let (data, surface) = scene.surface_at(&hit);
     let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
     let corners = data.mesh.triangles[triangle as usize];
-    let uv = super::scene::interpolate(&data.mesh.uvs, corners, weights).unwrap_or_default();
-    surface.material.emission * scene.texture(surface.emission_texture, uv).truncate()
+    let uvs = super::scene::both_uvs(&data.mesh, corners, weights);
+    surface.material.emission * scene.texture(surface.emission_texture, uvs).truncate()
 }
 
 /// Weight of a sample of density `a` that might have been taken with density `b`.

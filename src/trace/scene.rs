@@ -1,10 +1,11 @@
 //! The scene as rays need it: flat arrays, indices for references.
 
+use super::bsdf::Passed;
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
 use crate::bvh::{Accept, Hit, Ray, Tlas};
-use crate::scene::{Alpha, Glossy, Material, Texture, TriangleMesh};
+use crate::scene::{Alpha, Body, Glossy, Layers, Material, NormalMap, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{Affine2, DMat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -64,6 +65,12 @@ pub struct Surface {
     pub glossy_texture: Option<TextureIndex>,
     /// Emission.
     pub emission_texture: Option<TextureIndex>,
+    /// Tilts the shading normal.
+    pub normal_map: Option<NormalMap<TextureIndex>>,
+    /// What extensions add to metallic-roughness.
+    pub layers: Option<Box<Layers<TextureIndex>>>,
+    /// How much a rough body lets through, if the surface is one.
+    pub passed: Option<Arc<Passed>>,
 }
 
 impl Surface {
@@ -75,6 +82,7 @@ impl Surface {
         matches!(m.glossy, Glossy::None)
             && m.mirror == Vec3::ZERO
             && m.glass.is_none()
+            && self.normal_map.is_none()
             && m.emission == Vec3::ZERO
             && !m.unlit
     }
@@ -87,11 +95,29 @@ pub struct TextureIndex {
     pub index: u32,
     /// `texture_from_mesh` coordinates.
     pub uv_transform: Affine2,
+    /// Whether it lies on the mesh's second set of coordinates.
+    pub second_uvs: bool,
+}
+
+impl Surface {
+    /// The body behind the surface, if light can enter it.
+    #[must_use]
+    pub fn body(&self) -> Option<Body> {
+        self.layers.as_ref()?.transmission.as_ref()?.body
+    }
 }
 
 impl From<Material> for Surface {
     fn from(material: Material) -> Self {
-        Self { material, base_color_texture: None, glossy_texture: None, emission_texture: None }
+        Self {
+            material,
+            base_color_texture: None,
+            glossy_texture: None,
+            emission_texture: None,
+            normal_map: None,
+            layers: None,
+            passed: None,
+        }
     }
 }
 
@@ -124,13 +150,13 @@ impl<'a> TraceScene<'a> {
         (instance, materials.get(material as usize).unwrap_or(&materials[0]))
     }
 
-    /// `texture` at mesh coordinates `uv`, white where there is none.
+    /// `texture` at the first or second of `uvs`, white where there is none.
     #[must_use]
-    pub fn texture(&self, texture: Option<TextureIndex>, uv: Vec2) -> Vec4 {
-        let Some(TextureIndex { index, uv_transform }) = texture else { return Vec4::ONE };
+    pub fn texture(&self, texture: Option<TextureIndex>, uvs: [Vec2; 2]) -> Vec4 {
+        let Some(TextureIndex { index, uv_transform, second_uvs }) = texture else { return Vec4::ONE };
         let Some(texture) = self.surfaces.textures.get(index as usize) else { return Vec4::ONE };
         let filter = self.settings.filter.unwrap_or(texture.filter);
-        lookup(texture, filter, uv_transform.transform_point2(uv))
+        lookup(texture, filter, uv_transform.transform_point2(uvs[usize::from(second_uvs)]))
     }
 
     /// For each ray the nearest hit that is there: what alpha lets through is not. `random` in [0, 1)
@@ -165,9 +191,9 @@ impl<'a> TraceScene<'a> {
         let alpha = |()| {
             let corners = instance.mesh.triangles[hit.triangle as usize];
             let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-            let uv = interpolate(&instance.mesh.uvs, corners, weights).unwrap_or(Vec2::ZERO);
+            let uvs = both_uvs(&instance.mesh, corners, weights);
             let vertex = interpolate(&instance.mesh.colors, corners, weights).map_or(1.0, |c: Vec4| c.w);
-            surface.material.opacity * vertex * self.texture(surface.base_color_texture, uv).w
+            surface.material.opacity * vertex * self.texture(surface.base_color_texture, uvs).w
         };
         match surface.material.alpha {
             Alpha::Opaque => true,
@@ -196,6 +222,13 @@ impl<R: Fn(usize, u32) -> f32> Accept for Covering<'_, '_, R> {
         self.ignored.get(ray).copied().flatten() != Some((hit.instance, hit.triangle))
             && self.scene.covers(hit, |key| (self.random)(ray, key))
     }
+}
+
+/// Both sets of texture coordinates inside a triangle; zero if the mesh doesn't have them.
+#[must_use]
+pub fn both_uvs(mesh: &TriangleMesh, corners: [u32; 3], weights: Vec3) -> [Vec2; 2] {
+    let set = |uvs: &[Vec2]| interpolate(uvs, corners, weights).unwrap_or(Vec2::ZERO);
+    [set(&mesh.uvs), set(&mesh.second_uvs)]
 }
 
 /// A vertex attribute inside a triangle; `None` if the mesh doesn't have it.

@@ -2,7 +2,7 @@
 
 use super::TraceScene;
 use super::bsdf::Bsdf;
-use super::scene::{InstanceData, interpolate};
+use super::scene::{InstanceData, both_uvs, interpolate};
 use super::warp::offset;
 use crate::bvh::{Hit, Ray};
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -16,10 +16,16 @@ pub struct Interaction {
     pub error: Vec3,
     /// Unit geometric normal on the side that the ray came from.
     pub geometric_normal: Vec3,
-    /// Unit interpolated normal, on the same side; the geometric one where that is impossible.
+    /// Unit interpolated normal, of the same side; the geometric one where there is none. It may face
+    /// away from the eye.
     pub normal: Vec3,
-    /// Texture coordinates; zero if the mesh has none.
-    pub uv: Vec2,
+    /// Unit direction of growing u, of the same side, and in w the side of the bitangent w · (normal × tangent);
+    /// zero if the mesh has none.
+    pub tangent: Vec4,
+    /// Unit direction back along the ray.
+    pub wo: Vec3,
+    /// Both sets of texture coordinates; zero if the mesh has none.
+    pub uvs: [Vec2; 2],
     /// Vertex colour; white if the mesh has none.
     pub color: Vec4,
     /// The ray came from the front (counter-clockwise) side.
@@ -62,19 +68,26 @@ impl Interaction {
         let front = facet.dot(ray.direction) < 0.0;
         let geometric_normal = if front { facet } else { -facet };
 
+        let side = if front { 1.0 } else { -1.0 };
         let normal = interpolate(&mesh.normals, indices, weights)
             .and_then(|n: Vec3| (instance.normal_matrix * n.as_dvec3()).try_normalize())
-            .map_or(geometric_normal, |n| {
-                let n = if front { n } else { -n }.as_vec3();
-                // A normal that faces away from the eye would shade black: use the facet there.
-                if n.dot(ray.direction) < 0.0 && n.dot(geometric_normal) > 0.0 { n } else { geometric_normal }
-            });
+            .map_or(geometric_normal, |n| n.as_vec3() * side);
+        let tangent = interpolate(&mesh.tangents, indices, weights).map_or(Vec4::ZERO, |t: Vec4| {
+            let matrix = placement.world_from_local().matrix3;
+            // A mirroring placement turns the cross product of normal and tangent round.
+            let w = t.w.signum() * matrix.determinant().signum() as f32;
+            (matrix * t.truncate().as_dvec3())
+                .try_normalize()
+                .map_or(Vec4::ZERO, |t| (t.as_vec3() * side).extend(w * side))
+        });
         Self {
             position: position.as_vec3(),
             error: error.as_vec3(),
             geometric_normal,
             normal,
-            uv: interpolate(&mesh.uvs, indices, weights).unwrap_or(Vec2::ZERO),
+            tangent,
+            wo: -ray.direction.normalize(),
+            uvs: both_uvs(mesh, indices, weights),
             color: interpolate(&mesh.colors, indices, weights).unwrap_or(Vec4::ONE),
             front,
         }
@@ -103,6 +116,6 @@ impl Interaction {
         if material.emission == Vec3::ZERO || !(self.front || material.double_sided) {
             return Vec3::ZERO;
         }
-        material.emission * scene.texture(surface.emission_texture, self.uv).truncate()
+        material.emission * scene.texture(surface.emission_texture, self.uvs).truncate()
     }
 }

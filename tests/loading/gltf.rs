@@ -146,16 +146,6 @@ fn materials_keep_their_factors_textures_and_samplers() {
 }
 
 #[test]
-fn clear_transmission_becomes_glass_and_unlit_is_unlit() {
-    let more = r#","materials":[{"name":"g","pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0},
-        "extensions":{"KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_ior":{"ior":1.33}}},
-        {"name":"u","extensions":{"KHR_materials_unlit":{}}}]"#;
-    let (mut world, _) = loaded("a.gltf", &gltf_triangle("", r#","material":0"#, more));
-    assert_eq!(named::<Material>(&mut world, "g").glass.unwrap().ior, 1.33);
-    assert!(named::<Material>(&mut world, "u").unlit);
-}
-
-#[test]
 fn punctual_lights_are_photometric_and_keep_their_angles() {
     let more = r#","extensionsUsed":["KHR_lights_punctual"],"extensions":{"KHR_lights_punctual":{"lights":[
         {"type":"spot","intensity":683,"color":[1,0.5,0],"spot":{"innerConeAngle":0.25,"outerConeAngle":0.5}}]}}"#;

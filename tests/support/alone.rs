@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// One placed mesh as a scene.
 pub struct Alone {
     pub geometry: Geometry,
-    surfaces: Surfaces,
+    pub surfaces: Surfaces,
     coverage: Coverage,
     lights: Lights,
     viewpoint: Viewpoint,

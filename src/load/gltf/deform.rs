@@ -5,7 +5,7 @@ use super::accessor::Elements;
 use crate::load::error::LoadError;
 use crate::load::geometry::Part;
 use crate::load::report::Sink;
-use crate::scene::{Influences, Skin, Target};
+use crate::scene::{Influences, Skin, Target, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, Vec3};
 use gltf::json;
@@ -170,4 +170,22 @@ pub(super) fn gather(parts: &[Part]) -> (Influences, Vec<Target>) {
         }
     }
     (influences, gathered)
+}
+
+/// Vertices that were split off after `gather` follow what their originals do: there were `count` of them when
+/// the corners were those of `triangles`.
+pub(super) fn follow_splits(
+    (influences, targets): &mut (Influences, Vec<Target>),
+    count: usize,
+    triangles: &[[u32; 3]],
+    mesh: &TriangleMesh,
+) {
+    let mut originals: Vec<usize> = (0..mesh.positions.len()).collect();
+    for (&now, &before) in mesh.triangles.iter().flatten().zip(triangles.iter().flatten()) {
+        originals[now as usize] = before as usize;
+    }
+    if originals.len() > count {
+        *influences = influences.of(originals.iter().copied());
+        targets.iter_mut().for_each(|target| *target = target.of(originals.iter().copied()));
+    }
 }

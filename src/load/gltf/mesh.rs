@@ -8,6 +8,7 @@ use super::vertices::Used;
 use crate::load::error::LoadError;
 use crate::load::geometry::{self, Part};
 use crate::load::report::Sink;
+use crate::load::tangents;
 use crate::scene::{Deform, Mesh, Skin};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -64,9 +65,9 @@ impl Meshes {
                 Some(index) => *document.at(&palette.materials, &Index::new(index), "material", &place)?,
                 None => palette.default_material(document.file, sink),
             };
-            let uv_set = worn.map_or(0, |index| palette.uv_sets[index as usize]);
+            let uv_sets = worn.map_or([0; 2], |index| palette.uv_sets[index as usize]);
             let Some(mut part) =
-                read_primitive(document, primitive, uv_set, follower.as_ref(), &place, sink)?
+                read_primitive(document, primitive, uv_sets, follower.as_ref(), &place, sink)?
             else {
                 continue;
             };
@@ -85,9 +86,14 @@ impl Meshes {
             parts.push(part);
         }
         let parts = geometry::faceted_beside_smooth(parts);
-        let bound = follower.map(|follower| (follower, deform::gather(&parts)));
+        let mut bound = follower.map(|follower| (follower, deform::gather(&parts)));
         // What has no area now may have it in another shape.
-        let done = geometry::finish(geometry::merge(parts), bound.is_some());
+        let mut done = geometry::finish(geometry::merge(parts), bound.is_some());
+        let unsplit = bound.is_some().then(|| (done.mesh.positions.len(), done.mesh.triangles.clone()));
+        tangents::complete_for(&mut done.mesh, &materials, document.file, &label, sink);
+        if let (Some((_, bonds)), Some((count, triangles))) = (&mut bound, unsplit) {
+            deform::follow_splits(bonds, count, &triangles, &done.mesh);
+        }
         done.mended.tell(document.file, &label, sink);
         let name = mesh.name.clone().unwrap_or(label);
         let mesh = Arc::new(done.mesh);
@@ -108,7 +114,7 @@ impl Meshes {
 fn read_primitive(
     document: &Document<'_>,
     primitive: &Primitive,
-    uv_set: u32,
+    uv_sets: [u32; 2],
     follower: Option<&Follower>,
     place: &str,
     sink: &mut Sink<'_>,
@@ -139,13 +145,20 @@ fn read_primitive(
         return Err(document.broken(place, "no POSITION: nothing says where its vertices are"));
     };
     let normals = attribute(Semantic::Normals, &[3])?;
-    let mut uvs = attribute(Semantic::TexCoords(uv_set), &[2])?;
-    if uvs.is_none() && uv_set != 0 {
-        sink.repaired(file, place, format!("no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
-        uvs = attribute(Semantic::TexCoords(0), &[2])?;
-    }
+    let texture_coordinates = |set: u32, sink: &mut Sink<'_>| {
+        let uvs = attribute(Semantic::TexCoords(set), &[2])?;
+        if uvs.is_some() || set == 0 {
+            return Ok(uvs);
+        }
+        sink.repaired(file, place, format!("no TEXCOORD_{set}, TEXCOORD_0 instead"));
+        attribute(Semantic::TexCoords(0), &[2])
+    };
+    let uvs = texture_coordinates(uv_sets[0], sink)?;
+    let second_uvs = if uv_sets[1] == uv_sets[0] { None } else { texture_coordinates(uv_sets[1], sink)? };
+    // Without normals they don't count (glTF 2.0 specification, 3.7.2.1).
+    let tangents = attribute(Semantic::Tangents, &[4])?.filter(|_| normals.is_some());
     let colors = attribute(Semantic::Colors(0), &[3, 4])?;
-    let attributes = [normals.as_ref(), uvs.as_ref(), colors.as_ref()];
+    let attributes = [&normals, &uvs, &second_uvs, &tangents, &colors].map(Option::as_ref);
     for other in attributes.into_iter().flatten() {
         if other.count != positions.count {
             let problem = format!("attribute has a count of {}, POSITION {}", other.count, positions.count);
@@ -167,6 +180,8 @@ fn read_primitive(
         positions: vertices.clone().map(|v| Vec3::from(positions.get_f32(v))).collect(),
         normals: normals.map(|n| vertices.clone().map(|v| Vec3::from(n.get_f32(v))).collect()),
         uvs: uvs.map(|uvs| vertices.clone().map(|v| Vec2::from(uvs.get_f32(v))).collect()),
+        second_uvs: second_uvs.map(|uvs| vertices.clone().map(|v| Vec2::from(uvs.get_f32(v))).collect()),
+        tangents: tangents.map(|t| vertices.clone().map(|v| Vec4::from(t.get_f32(v))).collect()),
         colors: colors.map(|c| vertices.clone().map(|v| color(&c, v)).collect()),
         triangles: used.triangles,
         ..Part::default()

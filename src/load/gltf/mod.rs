@@ -15,6 +15,7 @@ mod buffer;
 mod container;
 mod deform;
 mod draco;
+mod layers;
 mod light;
 mod material;
 mod mesh;
@@ -46,9 +47,12 @@ const SUPPORTED: &[&str] = &[
     "FB_ngon_encoding",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",

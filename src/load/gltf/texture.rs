@@ -1,5 +1,6 @@
 //! glTF textures, samplers and images.
 
+use super::layers::Extensions;
 use super::{Document, buffer};
 use crate::load::error::{LoadError, ReadError};
 use crate::load::picture::{self, Picture};
@@ -10,34 +11,58 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec2};
 use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::material::NormalTexture;
 use gltf::json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
 /// One use of a texture by a material.
-pub(super) struct Use<'a> {
-    pub(super) index: &'a Index<json::Texture>,
-    transform: Option<&'a TextureTransform>,
+#[derive(Clone)]
+pub(super) struct Use {
+    pub(super) index: Index<json::Texture>,
+    transform: Option<TextureTransform>,
     pub(super) uv_set: u32,
 }
 
-impl<'a> From<&'a Info> for Use<'a> {
-    fn from(info: &'a Info) -> Self {
-        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
-        let uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
-        Self { index: &info.index, transform, uv_set }
+impl Use {
+    fn new(index: Index<json::Texture>, transform: Option<TextureTransform>, uv_set: u32) -> Self {
+        let uv_set = transform.as_ref().and_then(|t| t.tex_coord).unwrap_or(uv_set);
+        Self { index, transform, uv_set }
+    }
+}
+
+impl From<&Info> for Use {
+    fn from(info: &Info) -> Self {
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.clone());
+        Self::new(info.index, transform, info.tex_coord)
+    }
+}
+
+impl From<&NormalTexture> for Use {
+    fn from(texture: &NormalTexture) -> Self {
+        let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
+        let transform = others
+            .and_then(|others| others.get("KHR_texture_transform"))
+            .and_then(|value| serde_json::from_value(value.clone()).ok());
+        Self::new(texture.index, transform, texture.tex_coord)
     }
 }
 
 /// The texture uses of a material that end up in the picture.
-pub(super) fn uses(material: &json::Material) -> Vec<Use<'_>> {
+pub(super) fn uses(material: &json::Material) -> Vec<Use> {
     let pbr = &material.pbr_metallic_roughness;
     let old = material.extensions.as_ref().and_then(|e| e.pbr_specular_glossiness.as_ref());
     let base = old.map_or(pbr.base_color_texture.as_ref(), |old| old.diffuse_texture.as_ref());
     let rough = if old.is_some() { None } else { pbr.metallic_roughness_texture.as_ref() };
-    [base, rough, material.emissive_texture.as_ref()].into_iter().flatten().map(Use::from).collect()
+    let plain = [base, rough, material.emissive_texture.as_ref()];
+    let mut uses: Vec<Use> = plain.into_iter().flatten().map(Use::from).collect();
+    uses.extend(material.normal_texture.as_ref().map(Use::from));
+    uses.extend(old.and_then(|old| old.specular_glossiness_texture.as_ref()).map(Use::from));
+    uses.extend(Extensions::of(material).uses());
+    uses
 }
 
 /// Texture entities, spawned on first use; images are decoded before.
@@ -54,7 +79,7 @@ impl<'a> Textures<'a> {
         for (i, material) in root.materials.iter().enumerate() {
             for used in uses(material) {
                 let user = format!("material {i}");
-                let texture = document.at(&root.textures, used.index, "texture", &user)?;
+                let texture = document.at(&root.textures, &used.index, "texture", &user)?;
                 let Some(source) = source_of(texture) else {
                     let place = format!("texture {}", used.index.value());
                     sink.repaired(document.file, &place, "texture has no image source: white");
@@ -70,8 +95,15 @@ impl<'a> Textures<'a> {
         Ok(Self { document, images: indices.into_iter().zip(texels).collect(), spawned: BTreeMap::new() })
     }
 
-    pub(super) fn get(&mut self, info: &Info, encoding: Encoding, sink: &mut Sink<'_>) -> Option<TextureUse> {
-        let used = Use::from(info);
+    /// The texture of `used` by a mesh whose sets of texture coordinates are `sets`.
+    pub(super) fn get(
+        &mut self,
+        used: impl Into<Use>,
+        encoding: Encoding,
+        sets: [u32; 2],
+        sink: &mut Sink<'_>,
+    ) -> Option<TextureUse> {
+        let used = used.into();
         let index = used.index.value();
         let texture = self.document.root.textures.get(index)?;
         let texels = self.images.get(&source_of(texture)?)?;
@@ -82,8 +114,29 @@ impl<'a> Textures<'a> {
         });
         Some(TextureUse {
             texture: entity,
-            uv_transform: used.transform.map_or(Affine2::IDENTITY, uv_transform),
+            uv_transform: used.transform.as_ref().map_or(Affine2::IDENTITY, uv_transform),
+            second_uvs: used.uv_set != sets[0],
         })
+    }
+}
+
+impl Textures<'_> {
+    /// A texture whose texels are made from those of `info`, as data.
+    pub(super) fn made(
+        &mut self,
+        document: &Document<'_>,
+        info: &Info,
+        sets: [u32; 2],
+        sink: &mut Sink<'_>,
+        texel: impl Fn([u8; 4]) -> [u8; 4],
+    ) -> Option<TextureUse> {
+        let given = self.get(info, Encoding::Linear, sets, sink)?;
+        let Texture { texels, wrap, filter, .. } = sink.world.get::<Texture>(given.texture)?.clone();
+        let made = texels.texels.iter().map(|&given| texel(given)).collect();
+        let texels = Arc::new(Texels { width: texels.width, height: texels.height, texels: made });
+        let name = format!("{}: roughness", document.file);
+        let texture = Texture { texels, encoding: Encoding::Linear, wrap, filter };
+        Some(TextureUse { texture: sink.spawn((Name::new(name), texture)), ..given })
     }
 }
 

@@ -1,9 +1,10 @@
 //! `map_` statements of MTL libraries: options, pictures, textures.
 
+use super::relief;
 use crate::load::picture::{self, Picture};
 use crate::load::report::Sink;
 use crate::load::source::{Folder, IMAGE_LIMIT};
-use crate::scene::{Encoding, Filter, Texels, Texture, TextureUse, Wrap};
+use crate::scene::{Encoding, Filter, NormalMap, Texels, Texture, TextureUse, Wrap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec2};
@@ -16,11 +17,14 @@ struct Map<'a> {
     scale: Vec2,
     offset: Vec2,
     clamp: bool,
+    /// `-bm`.
+    bump: f32,
 }
 
 impl<'a> Map<'a> {
     fn parse(statement: &'a str) -> Self {
-        let mut map = Self { name: statement.trim(), scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false };
+        let mut map =
+            Self { name: statement.trim(), scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false, bump: 1.0 };
         while let Some(option) = map.name.strip_prefix('-').and_then(|_| first_word(map.name)) {
             let arguments = match option {
                 "-mm" => 2,
@@ -42,6 +46,9 @@ impl<'a> Map<'a> {
                 }
                 if i < 2 {
                     vector[i] = value.unwrap_or(0.0);
+                }
+                if option == "-bm" {
+                    map.bump = value.unwrap_or(1.0);
                 }
                 map.clamp |= option == "-clamp" && word == "on";
                 rest = rest[word.len()..].trim_start();
@@ -71,11 +78,31 @@ fn first_word(text: &str) -> Option<&str> {
     text.split_ascii_whitespace().next()
 }
 
+/// The statements that name pictures, in the spelling of `tidy`.
+const STATEMENTS: [&str; 9] =
+    ["map_Kd", "map_d", "map_Ke", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Bump", "norm"];
+
+/// What follows the keyword in this material.
+fn statement<'m>(material: &'m tobj::Material, keyword: &str) -> Option<&'m str> {
+    let known = match keyword {
+        "map_Kd" => &material.diffuse_texture,
+        "map_d" => &material.dissolve_texture,
+        "map_Ks" => &material.specular_texture,
+        "map_Ns" => &material.shininess_texture,
+        "map_Bump" => &material.normal_texture,
+        _ => return material.unknown_param.get(keyword).map(String::as_str),
+    };
+    known.as_deref()
+}
+
 /// Decoded images of a library by file name.
 pub(super) struct Textures {
     images: BTreeMap<String, Arc<Texels>>,
-    spawned: BTreeMap<(String, String, bool), Entity>,
+    spawned: BTreeMap<Key, Entity>,
 }
+
+/// What a texture is made of: for what, of which pictures, and whether it is clamped.
+type Key = (&'static str, String, String, bool);
 
 impl Textures {
     pub(super) fn new(
@@ -86,10 +113,7 @@ impl Textures {
     ) -> Self {
         let mut pictures: BTreeMap<String, Picture<'_>> = BTreeMap::new();
         for material in materials {
-            let emission = material.unknown_param.get("map_Ke");
-            for statement in
-                [&material.diffuse_texture, &material.dissolve_texture].into_iter().flatten().chain(emission)
-            {
+            for statement in STATEMENTS.iter().filter_map(|keyword| statement(material, keyword)) {
                 let name = Map::parse(statement).name;
                 pictures.entry(name.to_owned()).or_insert_with(|| Picture {
                     label: format!("texture `{name}`"),
@@ -105,62 +129,111 @@ impl Textures {
 
     /// `map_Kd` with the alpha of `map_d`.
     pub(super) fn color(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
-        let color = material.diffuse_texture.as_deref().map(Map::parse);
-        let cover = material.dissolve_texture.as_deref().map(Map::parse);
-        let main = color.as_ref().or(cover.as_ref())?.clone();
-        let key = |map: &Option<Map<'_>>| map.as_ref().map_or(String::new(), |map| map.name.to_owned());
-        let key = (key(&color), key(&cover), main.clamp);
-        let image =
-            |map: &Option<Map<'_>>| map.as_ref().and_then(|map| self.images.get(map.name)).map(Arc::clone);
-        let texels = match (image(&color), image(&cover)) {
-            (Some(color), None) => color,
-            (color, Some(cover)) => Arc::new(with_alpha(color.as_deref(), &cover)),
-            (None, None) => return None,
-        };
-        Some(self.spawn(key, texels, &main, sink))
+        self.pair("color", ["map_Kd", "map_d"], Encoding::Srgb, material, sink, with_alpha)
+    }
+
+    /// `map_Ks` with `map_Ns` as alpha.
+    pub(super) fn gloss(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
+        self.pair("gloss", ["map_Ks", "map_Ns"], Encoding::Srgb, material, sink, with_alpha)
+    }
+
+    /// `map_Pr` in green and `map_Pm` in blue.
+    pub(super) fn metal_and_roughness(
+        &mut self,
+        material: &tobj::Material,
+        sink: &mut Sink<'_>,
+    ) -> Option<TextureUse> {
+        self.pair("rough", ["map_Pr", "map_Pm"], Encoding::Linear, material, sink, |rough, metal| {
+            together(rough, metal, |[rough, ..], [metal, ..]| [255, rough, metal, 255])
+        })
     }
 
     pub(super) fn emission(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
-        let map = Map::parse(material.unknown_param.get("map_Ke")?);
+        self.pair("emission", ["map_Ke", ""], Encoding::Srgb, material, sink, with_alpha)
+    }
+
+    /// `norm`, or `map_Bump`: heights, or what many programs write there, a normal map.
+    pub(super) fn normals(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<NormalMap> {
+        let (statement, is_normal_map) = match statement(material, "norm") {
+            Some(norm) => (norm, true),
+            None => (statement(material, "map_Bump")?, false),
+        };
+        let map = Map::parse(statement);
         let texels = Arc::clone(self.images.get(map.name)?);
-        Some(self.spawn((map.name.to_owned(), String::new(), map.clamp), texels, &map, sink))
+        let is_normal_map = is_normal_map || relief::is_normal_map(&texels);
+        let kind = if is_normal_map { "normals" } else { "heights" };
+        let key = (kind, map.name.to_owned(), map.bump.to_string(), map.clamp);
+        let texels = if is_normal_map {
+            texels
+        } else {
+            Arc::new(relief::normals_of_heights(&texels, map.bump, map.clamp))
+        };
+        let texture = self.spawn(key, texels, Encoding::Linear, &map, sink);
+        Some(NormalMap { texture, scale: if is_normal_map { map.bump } else { 1.0 } })
+    }
+
+    /// One texture of the pictures of two statements, either of which may be missing.
+    fn pair(
+        &mut self,
+        kind: &'static str,
+        keywords: [&str; 2],
+        encoding: Encoding,
+        material: &tobj::Material,
+        sink: &mut Sink<'_>,
+        join: impl Fn(Option<&Texels>, Option<&Texels>) -> Texels,
+    ) -> Option<TextureUse> {
+        let maps = keywords.map(|keyword| statement(material, keyword).map(Map::parse));
+        let main = maps[0].as_ref().or(maps[1].as_ref())?.clone();
+        let [first, second] =
+            maps.each_ref().map(|map| map.as_ref().and_then(|map| self.images.get(map.name)).map(Arc::clone));
+        let [a, b] = maps.each_ref().map(|map| map.as_ref().map_or(String::new(), |map| map.name.to_owned()));
+        let texels = match (first, second) {
+            (None, None) => return None,
+            (Some(only), None) if encoding == Encoding::Srgb => only,
+            (first, second) => Arc::new(join(first.as_deref(), second.as_deref())),
+        };
+        Some(self.spawn((kind, a, b, main.clamp), texels, encoding, &main, sink))
     }
 
     fn spawn(
         &mut self,
-        key: (String, String, bool),
+        key: Key,
         texels: Arc<Texels>,
+        encoding: Encoding,
         map: &Map<'_>,
         sink: &mut Sink<'_>,
     ) -> TextureUse {
         let texture = *self.spawned.entry(key).or_insert_with(|| {
-            let texture =
-                Texture { texels, encoding: Encoding::Srgb, wrap: map.wrap(), filter: Filter::Bilinear };
+            let texture = Texture { texels, encoding, wrap: map.wrap(), filter: Filter::Bilinear };
             sink.spawn((Name::new(map.name.to_owned()), texture))
         });
-        TextureUse { texture, uv_transform: map.uv_transform() }
+        TextureUse { texture, uv_transform: map.uv_transform(), second_uvs: false }
     }
 }
 
 /// Colours of one picture (white if there is none) with the coverage of another: its alpha channel,
-/// or its red one where alpha says nothing. The size is the colour's.
-fn with_alpha(color: Option<&Texels>, cover: &Texels) -> Texels {
-    let size = color.unwrap_or(cover);
-    let (width, height) = (size.width, size.height);
-    let has_alpha = cover.texels.iter().any(|texel| texel[3] != 255);
-    let mut texels = Vec::with_capacity(size.texels.len());
-    for y in 0..u64::from(height) {
-        for x in 0..u64::from(width) {
-            let (there_x, there_y) = (
-                x * u64::from(cover.width) / u64::from(width),
-                y * u64::from(cover.height) / u64::from(height),
-            );
-            let there = cover.texels[(there_y * u64::from(cover.width) + there_x) as usize];
-            let [r, g, b, _] =
-                color.map_or([255; 4], |color| color.texels[(y * u64::from(width) + x) as usize]);
-            texels.push([r, g, b, if has_alpha { there[3] } else { there[0] }]);
-        }
-    }
+/// or its red one where alpha says nothing.
+fn with_alpha(color: Option<&Texels>, cover: Option<&Texels>) -> Texels {
+    let has_alpha = cover.is_some_and(|cover| cover.texels.iter().any(|texel| texel[3] != 255));
+    together(color, cover, |[r, g, b, _], there| [r, g, b, if has_alpha { there[3] } else { there[0] }])
+}
+
+/// Two pictures (white where there is none) texel by texel, in the size of the first.
+fn together(
+    first: Option<&Texels>,
+    second: Option<&Texels>,
+    join: impl Fn([u8; 4], [u8; 4]) -> [u8; 4],
+) -> Texels {
+    let (width, height) = first.or(second).map_or((1, 1), |size| (size.width, size.height));
+    let at = |picture: Option<&Texels>, x: u32, y: u32| {
+        picture.map_or([255; 4], |picture| {
+            let scaled = |i: u32, of: u32, to: u32| u64::from(i) * u64::from(of) / u64::from(to);
+            let (x, y) = (scaled(x, picture.width, width), scaled(y, picture.height, height));
+            picture.texels[(y * u64::from(picture.width) + x) as usize]
+        })
+    };
+    let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let texels = places.map(|(x, y)| join(at(first, x, y), at(second, x, y))).collect();
     Texels { width, height, texels }
 }
 
@@ -173,7 +246,13 @@ mod tests {
         let map = Map::parse("-blendu on -s 2 3 1 -o 0.5 0 -mm 0 1 -clamp on my tex.png");
         assert_eq!(
             map,
-            Map { name: "my tex.png", scale: Vec2::new(2., 3.), offset: Vec2::new(0.5, 0.), clamp: true }
+            Map {
+                name: "my tex.png",
+                scale: Vec2::new(2., 3.),
+                offset: Vec2::new(0.5, 0.),
+                clamp: true,
+                bump: 1.0
+            }
         );
         assert_eq!(Map::parse("-odd name.png").name, "-odd name.png");
     }

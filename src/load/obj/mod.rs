@@ -18,12 +18,14 @@ mod map;
 mod mtl;
 mod polygon;
 mod raw;
+mod relief;
 
 use super::error::LoadError;
 use super::geometry;
 use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
+use super::tangents;
 use crate::scene::{Instance, Material, Mesh};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -61,7 +63,8 @@ pub(super) fn load(
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
     sink.begin(Phase::Meshes);
-    let done = geometry::finish(assemble::mesh(&raw), false);
+    let mut done = geometry::finish(assemble::mesh(&raw), false);
+    tangents::complete_for(&mut done.mesh, &materials, file, "", sink);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {

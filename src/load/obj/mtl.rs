@@ -6,7 +6,7 @@ use crate::load::error::ReadError;
 use crate::load::report::Sink;
 use crate::load::settings::Materials;
 use crate::load::source::{Bytes, Folder, TEXT_LIMIT};
-use crate::scene::{Alpha, Glass, Glossy, Material};
+use crate::scene::{Alpha, Anisotropy, Clearcoat, Glass, Glossy, Layers, Material, Sheen};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -80,6 +80,12 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
     }
 }
 
+/// Statements of one number.
+const SCALARS: [&str; 11] = ["Ns", "Ni", "d", "Tr", "Pr", "Pm", "Ps", "Pc", "Pcr", "aniso", "anisor"];
+/// Statements that name a picture.
+const MAPS: [&str; 9] =
+    ["map_Kd", "map_d", "map_Ke", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Bump", "norm"];
+
 /// Only statements that `tobj` parses, in its spelling; warns of the others.
 fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
     let mut tidied = String::with_capacity(text.len());
@@ -100,6 +106,7 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
             .split_ascii_whitespace()
             .map(|word| word.parse().ok().filter(|v: &f32| v.is_finite()))
             .collect();
+        let keyword = if matches!(keyword, "bump" | "map_bump") { "map_Bump" } else { keyword };
         match (keyword, values.as_deref()) {
             ("Ka" | "Kd" | "Ks" | "Ke" | "Tf", Some([r, g, b, ..])) => {
                 writeln!(tidied, "{keyword} {r} {g} {b}")
@@ -109,25 +116,22 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
             }
             ("Ka" | "Kd" | "Ks" | "Ke" | "Tf", _) => ignore("without three numbers, ignored"),
             ("d", _) if rest.starts_with("-halo") => ignore("-halo is not supported, ignored"),
-            ("Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm", Some([value, ..])) => {
-                writeln!(tidied, "{keyword} {value}")
-            }
-            ("Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm", _) => ignore("without a number, ignored"),
+            (scalar, Some([value, ..])) if SCALARS.contains(&scalar) => writeln!(tidied, "{scalar} {value}"),
+            (scalar, _) if SCALARS.contains(&scalar) => ignore("without a number, ignored"),
             ("illum", Some([model, ..])) if (0.0..=10.0).contains(model) => {
                 writeln!(tidied, "illum {}", *model as u8)
             }
             ("illum", _) => ignore("with an unknown model, ignored"),
-            ("map_Kd" | "map_d" | "map_Ke", _) if rest.is_empty() => ignore("without a file name, ignored"),
-            ("map_Kd" | "map_d" | "map_Ke", _) => writeln!(tidied, "{keyword} {rest}"),
-            (
-                "map_Ks" | "map_Ns" | "map_Bump" | "map_bump" | "bump" | "disp" | "decal" | "refl" | "norm",
-                _,
-            ) => {
-                sink.ignored(
-                    library,
-                    &format!("line {line}"),
-                    format!("`{keyword}` textures are not supported"),
-                );
+            (map, _) if MAPS.contains(&map) => {
+                if rest.is_empty() {
+                    ignore("without a file name, ignored")
+                } else {
+                    writeln!(tidied, "{map} {rest}")
+                }
+            }
+            ("disp" | "decal" | "refl", _) => {
+                let what = format!("`{keyword}` textures are not supported");
+                sink.ignored(library, &format!("line {line}"), what);
                 Ok(())
             }
             // The ambient colour of a lighting model without other light.
@@ -175,12 +179,38 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
                 .map(|transparency| 1.0 - transparency)
         });
     let opacity = within(opacity.unwrap_or(1.0), 0.0, 1.0);
-    let pbr = match (scalar(material, "Pr"), scalar(material, "Pm")) {
-        (None, None) => None,
-        (rough, metal) => {
-            Some((within(rough.unwrap_or(0.5), 0.0, 1.0), within(metal.unwrap_or(0.0), 0.0, 1.0)))
-        }
+    let mut fraction = |keyword: &str| scalar(material, keyword).map(|value| within(value, 0.0, 1.0));
+    let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
+    let pbr = match (fraction("Pr"), fraction("Pm")) {
+        (None, None) if !is_mapped("map_Pr") && !is_mapped("map_Pm") => None,
+        // A map alone is the value itself.
+        (rough, metal) => Some((
+            rough.unwrap_or(if is_mapped("map_Pr") { 1.0 } else { 0.5 }),
+            metal.unwrap_or(if is_mapped("map_Pm") { 1.0 } else { 0.0 }),
+        )),
     };
+    let mut layers = Layers {
+        ior: material.optical_density.filter(|&ior| ior >= 1.0).unwrap_or(1.5),
+        ..Layers::default()
+    };
+    layers.clearcoat = fraction("Pc").filter(|&factor| factor > 0.0).map(|factor| Clearcoat {
+        factor,
+        texture: None,
+        roughness: fraction("Pcr").unwrap_or(0.0),
+        roughness_texture: None,
+        normal_map: None,
+    });
+    layers.sheen = fraction("Ps").filter(|&sheen| sheen > 0.0).map(|sheen| Sheen {
+        color: Vec3::splat(sheen),
+        color_texture: None,
+        roughness: 0.5,
+        roughness_texture: None,
+    });
+    layers.anisotropy = fraction("aniso").filter(|&strength| strength > 0.0).map(|strength| Anisotropy {
+        strength,
+        rotation: fraction("anisor").unwrap_or(0.0) * std::f32::consts::TAU,
+        texture: None,
+    });
     let ior = material.optical_density.filter(|&ior| ior > 1.0).unwrap_or(1.5);
     if out_of_range {
         sink.repaired(file, &format!("material `{name}`"), "a value is out of range, clamped");
@@ -203,10 +233,17 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         base_color_texture,
         glossy: match pbr {
             _ if is_glass => Glossy::None,
-            Some((roughness, metallic)) => Glossy::Ggx { metallic, roughness, texture: None },
-            None if uses_specular && !is_mirror => Glossy::BlinnPhong { specular, exponent },
+            Some((roughness, metallic)) => {
+                let texture = textures.metal_and_roughness(material, sink);
+                Glossy::Ggx { metallic, roughness, texture }
+            }
+            None if uses_specular && !is_mirror => {
+                Glossy::BlinnPhong { specular, exponent, texture: textures.gloss(material, sink) }
+            }
             None => Glossy::None,
         },
+        layers: (pbr.is_some() && !is_glass && layers != Layers::default()).then(|| Box::new(layers)),
+        normal_map: textures.normals(material, sink),
         mirror: if uses_specular && is_mirror { specular } else { Vec3::ZERO },
         glass: is_glass.then_some(Glass { ior, tint }),
         emission,

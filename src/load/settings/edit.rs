@@ -89,7 +89,7 @@ impl MaterialEdit {
         };
         match material.glossy {
             Glossy::None => {}
-            Glossy::BlinnPhong { specular, exponent } => {
+            Glossy::BlinnPhong { specular, exponent, .. } => {
                 (edit.specular, edit.exponent) = (Some(specular.to_array()), Some(exponent));
             }
             Glossy::Ggx { metallic, roughness, .. } => {
@@ -109,7 +109,7 @@ impl MaterialEdit {
             self.emission.map_or(material.emission, |emission| check.spectrum("emission", emission));
         match &mut material.glossy {
             Glossy::None => {}
-            Glossy::BlinnPhong { specular, exponent } => {
+            Glossy::BlinnPhong { specular, exponent, .. } => {
                 *specular = color(check, "specular", self.specular, *specular);
                 *exponent = self.exponent.unwrap_or(*exponent);
                 check.that(exponent.is_finite() && *exponent >= 0.0, || {

@@ -113,7 +113,7 @@ fn spawn_texture(table: &MaterialTable, name: &str, texels: &Arc<Texels>, sink: 
         Texture { texels: Arc::clone(texels), encoding: Encoding::Srgb, wrap: [Wrap::Repeat; 2], filter };
     let texture = sink.spawn((Name::new(format!("texture of {name}")), texture));
     let scale = table.uv_scale.map_or(Vec2::ONE, Vec2::from);
-    TextureUse { texture, uv_transform: Affine2::from_scale(scale) }
+    TextureUse { texture, uv_transform: Affine2::from_scale(scale), second_uvs: false }
 }
 
 fn convert(table: &MaterialTable, check: &mut Check) -> Material {
@@ -149,7 +149,7 @@ fn convert(table: &MaterialTable, check: &mut Check) -> Material {
         base_color,
         base_color_texture: None,
         glossy: if is_phong {
-            Glossy::BlinnPhong { specular, exponent }
+            Glossy::BlinnPhong { specular, exponent, texture: None }
         } else if is_ggx {
             Glossy::Ggx {
                 metallic: check.unit("metallic", table.metallic.unwrap_or(0.0)),
@@ -159,6 +159,8 @@ fn convert(table: &MaterialTable, check: &mut Check) -> Material {
         } else {
             Glossy::None
         },
+        layers: None,
+        normal_map: None,
         mirror,
         glass: table.glass.as_ref().map(|_| Glass { ior, tint }),
         emission: check.spectrum("emission", table.emission.unwrap_or([0.0; 3])),

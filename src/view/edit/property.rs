@@ -125,7 +125,7 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
                 add(Property::Roughness, "roughness", f64::from(roughness), 0.05, false, UNIT);
                 add(Property::Metallic, "metallic", f64::from(metallic), 0.1, false, UNIT);
             }
-            Glossy::BlinnPhong { specular, exponent } => {
+            Glossy::BlinnPhong { specular, exponent, .. } => {
                 add(Property::Specular, "specular", f64::from(specular.max_element()), 0.05, false, UNIT);
                 add(Property::Exponent, "exponent", f64::from(exponent), 0.2, true, [0.0, 1e6]);
             }
@@ -276,7 +276,7 @@ mod tests {
 
     fn world() -> (World, Vec<Entity>) {
         let mut world = World::new();
-        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.2), exponent: 30.0 };
+        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.2), exponent: 30.0, texture: None };
         let material = world.spawn(Material { glossy: phong, ..Material::default() }).id();
         let ggx = Glossy::Ggx { metallic: 0.0, roughness: 0.5, texture: None };
         let shiny = world.spawn(Material { glossy: ggx, ..Material::default() }).id();
