@@ -3,6 +3,7 @@
 //! Directions leave the surface: `wo` to the eye, `wi` to the light, both of unit length.
 
 pub mod albedo;
+mod base;
 mod classic;
 mod glass;
 mod layered;
@@ -29,7 +30,6 @@ pub struct Bsdf {
 }
 
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::large_enum_variant, reason = "made anew at every hit: a heap would cost more")]
 enum Kind {
     Classic(Classic),
     Layered(Layered),
