@@ -1,6 +1,6 @@
 //! Tangents for normal maps, where a file has none: Mikkelsen's, which those who bake such maps use too.
 
-use super::report::Sink;
+use super::report::{Kind, Sink};
 use crate::scene::{Material, TriangleMesh};
 use bevy_ecs::prelude::*;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
@@ -9,7 +9,16 @@ use std::collections::HashMap;
 
 /// Gives tangents to the triangles whose material of `materials`, by slot, has a normal map; `place` names the
 /// mesh.
-pub(super) fn complete_for(mesh: &mut TriangleMesh, materials: &[Entity], place: &str, sink: &mut Sink<'_>) {
+///
+/// Only if it `may_split` vertices, more than one tangent of a vertex are kept.
+pub(super) fn complete_for(
+    mesh: &mut TriangleMesh,
+    materials: &[Entity],
+    may_split: bool,
+    file: &str,
+    place: &str,
+    sink: &mut Sink<'_>,
+) {
     let world = &*sink.world;
     let wants: Vec<_> =
         materials.iter().map(|material| world.get::<Material>(*material).and_then(directed)).collect();
@@ -18,12 +27,11 @@ pub(super) fn complete_for(mesh: &mut TriangleMesh, materials: &[Entity], place:
         mesh.tangents = Vec::new();
         return;
     }
-    let without = complete(mesh, &wants);
+    let without = complete(mesh, &wants, may_split);
     if without > 0 {
-        sink.warn(format!(
-            "{place}: {without} corners have a normal map or a brush, but texture coordinates that say \
-             nothing about its direction: it is left out there"
-        ));
+        let what = "corners with a normal map or a brush, but texture coordinates that say nothing about its direction: it \
+                    is left out there";
+        sink.remark(Kind::Ignored, file, place, what.to_owned(), without);
     }
 }
 
@@ -45,7 +53,7 @@ fn directed(material: &Material) -> Option<bool> {
 /// coordinates.
 ///
 /// Reference: M. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008; glTF 2.0 specification, 3.7.2.1.
-fn complete(mesh: &mut TriangleMesh, wants: &[Option<bool>]) -> usize {
+fn complete(mesh: &mut TriangleMesh, wants: &[Option<bool>], may_split: bool) -> usize {
     let mut without = 0;
     for second_uvs in [false, true] {
         let faces = bare_faces(mesh, wants, second_uvs);
@@ -60,7 +68,7 @@ fn complete(mesh: &mut TriangleMesh, wants: &[Option<bool>]) -> usize {
         let _ = generate_tangents(&mut made);
         let Made { faces, tangents, .. } = made;
         without += tangents.iter().flatten().filter(|t| **t == Vec4::ZERO).count();
-        attach(mesh, &faces, &tangents);
+        attach(mesh, &faces, &tangents, may_split);
     }
     without
 }
@@ -120,7 +128,7 @@ impl Geometry for Made<'_> {
 }
 
 /// Writes the tangents of the corners of `faces` to the vertices.
-fn attach(mesh: &mut TriangleMesh, faces: &[usize], tangents: &[[Vec4; 3]]) {
+fn attach(mesh: &mut TriangleMesh, faces: &[usize], tangents: &[[Vec4; 3]], may_split: bool) {
     mesh.tangents.resize(mesh.positions.len(), Vec4::ZERO);
     let bits = |t: Vec4| t.to_array().map(f32::to_bits);
     let mut first: HashMap<u32, Vec4> = HashMap::new();
@@ -129,8 +137,8 @@ fn attach(mesh: &mut TriangleMesh, faces: &[usize], tangents: &[[Vec4; 3]]) {
         for (corner, &tangent) in corners.iter().enumerate() {
             let vertex = mesh.triangles[face][corner];
             let at = *first.entry(vertex).or_insert(tangent);
-            if at == tangent {
-                mesh.tangents[vertex as usize] = tangent;
+            if at == tangent || !may_split {
+                mesh.tangents[vertex as usize] = at;
                 continue;
             }
             let twin = *twins.entry((vertex, bits(tangent))).or_insert_with(|| {

@@ -3,9 +3,11 @@
 //! Everything is linear: lengths in scene units (glTF: metres), angles in radians, colours and
 //! radiances as linear RGB with Rec. 709 primaries. The world is right-handed, +Y up.
 
+pub mod animation;
 pub mod bounds;
 pub mod camera;
 pub mod color;
+pub mod deform;
 pub mod layers;
 pub mod light;
 pub mod material;
@@ -13,8 +15,10 @@ pub mod mesh;
 pub mod texture;
 pub mod transform;
 
+pub use animation::{Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, play};
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Projection};
+pub use deform::{Deform, Influences, Skin, Target, deform};
 pub use layers::{Anisotropy, Body, Clearcoat, Layers, Sheen, Transmission};
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, NormalMap, TextureUse};

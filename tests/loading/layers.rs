@@ -14,7 +14,7 @@ fn material(pbr: &str, extensions: &str) -> (World, LoadReport) {
 
 fn layers(extensions: &str) -> Layers {
     let (mut world, report) = material("", extensions);
-    assert_eq!(report.warnings, [""; 0]);
+    assert_eq!(report.warnings(), [""; 0]);
     *named::<Material>(&mut world, "m").layers.expect("no layers")
 }
 
@@ -68,7 +68,7 @@ fn specular_and_glossiness_are_a_dielectric_of_that_reflectance() {
         r#""KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0.1,0.2,0.3,1],"specularFactor":[0.5,0.4,0.3],
             "glossinessFactor":0.5,"specularGlossinessTexture":{"index":0}}"#,
     );
-    assert_eq!(report.warnings, [""; 0]);
+    assert_eq!(report.warnings(), [""; 0]);
     let material = named::<Material>(&mut world, "m");
     let layers = material.layers.unwrap();
     assert_eq!(material.base_color, Vec3::new(0.1, 0.2, 0.3));
@@ -84,6 +84,6 @@ fn specular_and_glossiness_are_a_dielectric_of_that_reflectance() {
 #[test]
 fn an_extension_that_is_written_oddly_is_ignored_and_named() {
     let (mut world, report) = material("", r#""KHR_materials_sheen":{"sheenColorFactor":"red"}"#);
-    assert_says(&report.warnings.join("\n"), "KHR_materials_sheen");
+    assert_says(&report.warnings().join("\n"), "KHR_materials_sheen");
     assert_eq!(named::<Material>(&mut world, "m").layers, None);
 }

@@ -19,7 +19,7 @@ fn texel(world: &World, texture: Option<penumbra::scene::TextureUse>) -> ([u8; 4
 #[test]
 fn gloss_has_its_colour_and_its_exponent_from_pictures() {
     let (mut world, report) = material("Ks 0.2 0.2 0.2\nNs 50\nmap_Ks blue.png\nmap_Ns red.png");
-    assert_eq!(report.warnings, [""; 0]);
+    assert_eq!(report.warnings(), [""; 0]);
     let Glossy::BlinnPhong { exponent: 50.0, texture, .. } = named::<Material>(&mut world, "m").glossy else {
         panic!("not glossy")
     };
@@ -30,7 +30,7 @@ fn gloss_has_its_colour_and_its_exponent_from_pictures() {
 fn metal_roughness_varnish_cloth_and_brush_make_a_layered_surface() {
     let (mut world, report) =
         material("Pr 0.5\nPm 0.25\nPc 1\nPcr 0.1\nPs 0.5\naniso 0.7\nanisor 0.25\nNi 1.8\nmap_Pr red.png");
-    assert_eq!(report.warnings, [""; 0]);
+    assert_eq!(report.warnings(), [""; 0]);
     let material = named::<Material>(&mut world, "m");
     let Glossy::Ggx { metallic: 0.25, roughness: 0.5, texture } = material.glossy else {
         panic!("{:?}", material.glossy)
@@ -51,7 +51,7 @@ fn metal_roughness_varnish_cloth_and_brush_make_a_layered_surface() {
 fn a_bump_map_is_turned_into_normals_unless_it_has_them_already() {
     let normal = |statement: &str| {
         let (mut world, report) = material(statement);
-        assert_eq!(report.warnings, [""; 0]);
+        assert_eq!(report.warnings(), [""; 0]);
         let map = named::<Material>(&mut world, "m").normal_map.expect("no normal map");
         assert!(!only_mesh(&mut world).tangents.is_empty());
         (texel(&world, Some(map.texture)), map.scale)

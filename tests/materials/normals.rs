@@ -157,7 +157,7 @@ fn made_tangents_are_those_that_files_have() {
         let [given, made] = [&original, &bare].map(|path| {
             let mut world = bevy_ecs::world::World::new();
             let report = load(&mut world, &SceneSource::File(path.clone()), &LoadOptions::default()).unwrap();
-            assert_eq!(report.warnings, [""; 0]);
+            assert_eq!(report.warnings(), [""; 0]);
             let mut query = world.query::<(&Name, &Mesh)>();
             let mut meshes: Vec<_> =
                 query.iter(&world).map(|(name, mesh)| (name.to_string(), mesh.0.clone())).collect();

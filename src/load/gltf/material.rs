@@ -29,7 +29,7 @@ impl Palette {
     /// The material for primitives without one, spawned when it is first needed.
     pub(super) fn default_material(&mut self, file: &str, sink: &mut Sink<'_>) -> Entity {
         *self.default.get_or_insert_with(|| {
-            sink.decide(format!("{file}: surfaces without a material are light grey"));
+            sink.decide(file, "surfaces without a material are light grey");
             sink.spawn((Name::new("default"), Material::default()))
         })
     }
@@ -71,10 +71,10 @@ fn uv_sets(document: &Document<'_>, material: &json::Material, name: &str, sink:
     let second = others.next().unwrap_or(first);
     if others.any(|set| set != second) {
         let file = document.file;
-        sink.warn(format!(
-            "{file}: material `{name}`: its textures use more than two TEXCOORD sets; all but TEXCOORD_{first} \
-             get TEXCOORD_{second}"
-        ));
+        let what = format!(
+            "textures use more than two TEXCOORD sets; all but TEXCOORD_{first} get TEXCOORD_{second}"
+        );
+        sink.approximated(file, &format!("material `{name}`"), what);
     }
     [first, second]
 }
@@ -104,8 +104,8 @@ fn convert(
     let mut rough_texture = pbr.metallic_roughness_texture.as_ref();
     let unlit = extensions.unlit.is_some();
     let asked = Extensions::of(material);
-    for name in &asked.odd {
-        sink.warn(format!("{}: material `{name}`: {name} is not as specified, ignored", document.file));
+    for odd in &asked.odd {
+        sink.ignored(document.file, &format!("material `{name}`"), format!("{odd} is not as specified"));
     }
     let mut layers = if unlit { None } else { asked.layers(sets, &unit, textures, sink) };
     let mut roughness_texture = None;
@@ -122,7 +122,7 @@ fn convert(
     let emission = Vec3::from(material.emissive_factor.0) * strength;
     let emission_is_legal = emission.is_finite() && emission.min_element() >= 0.0;
     if clamped.get() || !emission_is_legal {
-        sink.warn(format!("{}: material `{name}`: factor out of range, clamped", document.file));
+        sink.repaired(document.file, &format!("material `{name}`"), "factor out of range, clamped");
     }
     Material {
         base_color,
