@@ -117,6 +117,16 @@ impl Deform {
                 *normal = normal.as_dvec3().try_normalize().map_or(rest, DVec3::as_vec3);
             }
         });
+        if let Some((skin, matrices)) = self.skin.as_ref().zip(mesh_from_bind) {
+            for (i, tangent) in mesh.tangents.iter_mut().enumerate() {
+                if let Some(carrier) = skin.influences.carrier(i, matrices) {
+                    let along = carrier.matrix3 * tangent.truncate().as_dvec3();
+                    // A mirroring pose turns the cross product of normal and tangent round.
+                    let side = tangent.w * carrier.matrix3.determinant().signum() as f32;
+                    *tangent = along.normalize_or_zero().as_vec3().extend(side);
+                }
+            }
+        }
         mesh
     }
 }

@@ -132,9 +132,13 @@ impl Block {
     /// Puts a point that is already known into its place.
     pub fn set_point(&mut self, i: usize, at: &Interaction) {
         self.position.set(i, at.position);
-        self.geometric_normal.set(i, at.geometric_normal);
+        self.geometric_normal.set(i, at.side());
         self.normal.set(i, at.normal);
-        self.origin.set(i, offset(at.position, at.error, at.geometric_normal));
+        self.origin.set(i, at.lit_origin_toward(at.geometric_normal));
+        if at.lifted.is_some() {
+            // What is known holds for points on the triangle.
+            self.known[i] = None;
+        }
     }
 
     /// The points on flat triangles that are where their mesh is, all lanes: what [`Interaction::new`] does.

@@ -364,6 +364,10 @@ impl Batch {
             }
             throughput /= survival;
         }
+        let origin = match sample.pdf {
+            Some(_) => at.lit_origin_toward(sample.wi),
+            None => at.origin_toward(sample.wi),
+        };
         let absorption = match surface.body() {
             Some(body) if at.geometric_normal.dot(sample.wi) < 0.0 => {
                 if at.front {
@@ -377,7 +381,7 @@ impl Batch {
         self.next.push(Path {
             entry: path.entry,
             sampler: path.sampler,
-            ray: Ray::new(at.origin_toward(sample.wi), sample.wi),
+            ray: Ray::new(origin, sample.wi),
             throughput,
             depth: path.depth + 1,
             bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal(), counted: 0 }),
@@ -422,7 +426,7 @@ impl Batch {
         if contribution == Vec3::ZERO {
             return;
         }
-        let origin = at.origin_toward(sample.wi);
+        let origin = at.lit_origin_toward(sample.wi);
         let ray = match sample.target {
             Some(target) => Ray { origin, direction: target - origin, t_max: 1.0 },
             None => Ray::new(origin, sample.wi),

@@ -30,6 +30,9 @@ pub struct Interaction {
     pub color: Vec4,
     /// The ray came from the front (counter-clockwise) side.
     pub front: bool,
+    /// Where the smooth surface would be that the normals speak of, if it bulges out there and nothing is
+    /// in between.
+    pub lifted: Option<Vec3>,
 }
 
 /// 2⁻²⁴, the rounding unit of f32.
@@ -80,7 +83,7 @@ impl Interaction {
                 .try_normalize()
                 .map_or(Vec4::ZERO, |t| (t.as_vec3() * side).extend(w * side))
         });
-        Self {
+        let mut at = Self {
             position: position.as_vec3(),
             error: error.as_vec3(),
             geometric_normal,
@@ -90,6 +93,58 @@ impl Interaction {
             uvs: both_uvs(mesh, indices, weights),
             color: interpolate(&mesh.colors, indices, weights).unwrap_or(Vec4::ONE),
             front,
+            lifted: None,
+        };
+        if !mesh.normals.is_empty() && at.normal.dot(at.wo) > 0.0 {
+            let world_from_local = placement.world_from_local();
+            let smooth = [0, 1, 2].map(|i| {
+                let normal = mesh.normals.get(indices[i] as usize).map_or(DVec3::ZERO, |n| n.as_dvec3());
+                let away = position - world_from_local.transform_point3(corners[i]);
+                let normal = (instance.normal_matrix * normal).normalize_or_zero() * f64::from(side);
+                (weights[i], away.as_vec3(), normal.as_vec3())
+            });
+            at.lifted = at.lift(scene, &smooth);
+        }
+        at
+    }
+
+    /// The point on the smooth surface: facets of a coarse mesh would shadow each other where its normals still
+    /// see the light. `smooth`: weight, way from the corner to here, and normal of each corner.
+    ///
+    /// Reference: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter 4. The ray that
+    /// asks what is in between is ours: without it, light leaks around whatever is nearer than the lift.
+    fn lift(&self, scene: &TraceScene, smooth: &[(f32, Vec3, Vec3); 3]) -> Option<Vec3> {
+        if smooth.iter().all(|(_, _, normal)| normal.dot(self.geometric_normal) > 1.0 - 1e-6) {
+            return None;
+        }
+        let lift: Vec3 = smooth
+            .iter()
+            .map(|&(weight, away, normal)| normal * (weight * (-away.dot(normal)).max(0.0)))
+            .sum();
+        if lift.dot(self.geometric_normal) <= 4.0 * self.error.dot(self.geometric_normal.abs()) {
+            return None;
+        }
+        let origin = offset(self.position, self.error, self.geometric_normal);
+        let ray = Ray { origin, direction: self.position + lift - origin, t_max: 1.0 };
+        let is_clear = ray.direction != Vec3::ZERO && !scene.geometry.tlas.any_hit(&ray);
+        is_clear.then_some(self.position + lift)
+    }
+
+    /// What decides whether a direction leaves the surface: the true normal, or where rays start from the smooth
+    /// surface, that one's.
+    #[must_use]
+    pub fn side(&self) -> Vec3 {
+        if self.lifted.is_some() { self.normal } else { self.geometric_normal }
+    }
+
+    /// Where a ray toward or from a light starts: as [`Interaction::origin_toward`], or from the smooth surface.
+    #[must_use]
+    pub fn lit_origin_toward(&self, direction: Vec3) -> Vec3 {
+        match self.lifted {
+            Some(lifted) if self.normal.dot(direction) > 0.0 => {
+                offset(lifted, self.error, self.geometric_normal)
+            }
+            _ => self.origin_toward(direction),
         }
     }
 

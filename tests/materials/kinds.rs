@@ -40,6 +40,7 @@ impl Seen {
             uvs: [Vec2::ZERO; 2],
             color: Vec4::ONE,
             front,
+            lifted: None,
         };
         Self { stage, surface, at }
     }

@@ -18,3 +18,4 @@ mod normals;
 mod samplers;
 #[path = "../support/stage.rs"]
 mod stage;
+mod terminator;

@@ -27,6 +27,7 @@ fn floor_point(normal: Vec3, wo: Vec3) -> Interaction {
         uvs: [Vec2::ZERO; 2],
         color: Vec4::ONE,
         front: true,
+        lifted: None,
     }
 }
 

@@ -3,6 +3,7 @@
 //! Directions leave the surface: `wo` to the eye, `wi` to the light, both of unit length.
 
 pub mod albedo;
+mod base;
 mod classic;
 mod glass;
 mod layered;
@@ -25,11 +26,12 @@ use layered::Layered;
 pub struct Bsdf {
     normal: Vec3,
     geometric_normal: Vec3,
+    /// Decides whether a direction leaves the surface.
+    side: Vec3,
     kind: Kind,
 }
 
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::large_enum_variant, reason = "made anew at every hit: a heap would cost more")]
 enum Kind {
     Classic(Classic),
     Layered(Layered),
@@ -117,7 +119,7 @@ impl Bsdf {
                 front: at.front,
             }),
         };
-        Self { normal, geometric_normal: at.geometric_normal, kind }
+        Self { normal, geometric_normal: at.geometric_normal, side: at.side(), kind }
     }
 
     /// Unit shading normal, on the side of the eye.
@@ -146,7 +148,7 @@ impl Bsdf {
     #[must_use]
     pub fn evaluate(&self, wi: Vec3, lobes: Lobes) -> Evaluated {
         // The true normal decides whether this is a reflection; the shading one has to agree.
-        let above = self.geometric_normal.dot(wi) > 0.0;
+        let above = self.side.dot(wi) > 0.0;
         match &self.kind {
             Kind::Classic(_) if !above => Evaluated::default(),
             Kind::Classic(classic) => classic.evaluate(wi, lobes),
@@ -177,7 +179,8 @@ impl Bsdf {
         };
         let Proposal { wi, through, follow, delta } = proposal;
         // What by its shading normal would enter the surface, or not enter it, carries nothing.
-        if (self.geometric_normal.dot(wi) < 0.0) != through {
+        let side = if delta.is_some() { self.geometric_normal } else { self.side };
+        if (side.dot(wi) < 0.0) != through {
             return None;
         }
         if let Some(weight) = delta {
