@@ -3,7 +3,7 @@
 use crate::image::develop::{Display, Picture, develop};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
-use crate::scene::propagate_transforms;
+use crate::scene::{Playing, deform, play, propagate_transforms};
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
 use crate::trace::noise;
 use crate::trace::{
@@ -189,7 +189,9 @@ fn frame_schedule() -> Schedule {
     frame.set_executor(SingleThreadedExecutor::new());
     frame.configure_sets((Input, Update, Sync, Trace, Present).chain());
     frame.add_systems((
-        propagate_transforms.in_set(Update),
+        (play.run_if(resource_exists_and_changed::<Playing>), propagate_transforms, deform)
+            .chain()
+            .in_set(Update),
         (
             sync::build_blas,
             sync::choose_origin,

@@ -9,6 +9,7 @@ pub mod app;
 pub mod bvh;
 pub mod cli;
 pub mod farm;
+mod first_look;
 pub mod image;
 pub mod load;
 pub mod open;

@@ -2,11 +2,13 @@
 
 use clap::{CommandFactory, Parser};
 use indicatif::{ProgressBar, ProgressStyle};
-use penumbra::cli::{Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs};
+use penumbra::cli::{
+    CheckArgs, Cli, Command, CompareArgs, MergeArgs, OutputArgs, ReportArgs, SceneArgs, WindowArgs,
+};
 use penumbra::farm::{self, is_film};
 use penumbra::image::compare::compare_files;
 use penumbra::image::{ImageError, PictureFormat, save};
-use penumbra::load::{LoadReport, built_in_scenes};
+use penumbra::load::{Card, LoadError, LoadOptions, LoadReport, Phase, Verdict, Watcher, built_in_scenes};
 use penumbra::open::OpenError;
 use penumbra::render::{Progress, RenderError, RenderJob, RenderSummary, render};
 use penumbra::report::{Report, ReportError, measure_all, write};
@@ -30,6 +32,7 @@ mod exit {
     pub const SCENE_NOT_READABLE: u8 = 3;
     pub const BEFORE_TARGET: u8 = 4;
     pub const ABOVE_LIMIT: u8 = 5;
+    pub const NOT_ALL_AS_IN_THE_FILE: u8 = 6;
     pub const INTERRUPTED: u8 = 130;
 }
 
@@ -51,6 +54,7 @@ fn main() -> ExitCode {
             0
         }
         Some(Command::Man) => manual(),
+        Some(Command::Check(args)) => check(&args),
         Some(Command::Compare(args)) => compare(&args),
         Some(Command::Merge(args)) => merge(&args),
         Some(Command::Report(args)) => report(&args),
@@ -213,9 +217,10 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
     set_threads(scene.threads);
     let interrupt = Arc::new(AtomicBool::new(false));
     stop_on_signals(&interrupt);
+    let bar = Bar::new(output.quiet);
     let job = RenderJob {
         source,
-        load: scene.load_options(),
+        load: LoadOptions { watcher: bar.watcher(), ..scene.load_options() },
         wishes: scene.wishes(output),
         time_limit: output.time_limit,
         noise: output.noise,
@@ -225,7 +230,6 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
         outputs,
         interrupt,
     };
-    let bar = Bar::new(output.quiet);
     let say = |report: &LoadReport| {
         if !output.quiet {
             tell(report);
@@ -235,6 +239,10 @@ fn headless_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) ->
     bar.clear();
     match result {
         Ok(summary) => finish(&summary, output),
+        Err(RenderError::Open(OpenError::Load(error @ LoadError::NotThere { .. }))) => {
+            eprintln!("error: {error}");
+            exit::BAD_COMMAND_LINE
+        }
         Err(RenderError::Open(OpenError::Load(error))) => {
             eprintln!("error: {error}");
             exit::SCENE_NOT_READABLE
@@ -288,10 +296,10 @@ fn finish(summary: &RenderSummary, output: &OutputArgs) -> u8 {
 }
 
 fn tell(report: &LoadReport) {
-    for line in &report.warnings {
+    for line in report.warnings() {
         eprintln!("warning: {line}");
     }
-    for line in &report.decisions {
+    for line in report.decisions() {
         eprintln!("note: {line}");
     }
 }
@@ -344,6 +352,25 @@ impl Bar {
         Self { bar, last_line: std::cell::Cell::new(Some(Instant::now())), quiet }
     }
 
+    /// Shows how far loading is.
+    fn watcher(&self) -> Watcher {
+        let Some(bar) = self.bar.clone() else { return Watcher::default() };
+        Watcher(Some(Arc::new(move |phase, part| {
+            // Where each phase begins, as large files go.
+            let (start, end) = match phase {
+                Phase::Reading => (0.0, 0.1),
+                Phase::Parsing => (0.1, 0.4),
+                Phase::Decompressing => (0.4, 0.5),
+                Phase::Images => (0.5, 0.8),
+                Phase::Meshes => (0.8, 0.95),
+                Phase::Framing => (0.95, 1.0),
+            };
+            let part: f32 = start + (end - start) * part;
+            bar.set_position((part * 1000.0) as u64);
+            bar.set_message(format!("loading: {phase}"));
+        })))
+    }
+
     fn update(&self, progress: &Progress) {
         let (part, left) = how_far(progress);
         let left = left.map_or("—".to_owned(), |seconds| format!("{seconds:.0} s left"));
@@ -373,6 +400,32 @@ impl Bar {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Prints the report card of each file.
+fn check(args: &CheckArgs) -> u8 {
+    let options = args.load_options();
+    let mut worst = Verdict::Valid;
+    for file in &args.files {
+        let card = Card::check(file, &options);
+        worst = worst.max(card.verdict);
+        if !args.json {
+            println!("{}", card.text());
+            continue;
+        }
+        match serde_json::to_string(&card) {
+            Ok(json) => println!("{json}"),
+            Err(error) => {
+                eprintln!("error: {error}");
+                return exit::FAILED;
+            }
+        }
+    }
+    match worst {
+        Verdict::Valid => 0,
+        Verdict::Repaired => exit::NOT_ALL_AS_IN_THE_FILE,
+        Verdict::Refused => exit::SCENE_NOT_READABLE,
     }
 }
 

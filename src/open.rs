@@ -2,7 +2,7 @@
 
 use crate::app::{App, FrameBudget};
 use crate::bvh::Isa;
-use crate::image::develop::suggest_exposure;
+use crate::first_look;
 use crate::image::{Display, ToneMap};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform};
@@ -140,17 +140,7 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
 
     let start = Instant::now();
     app.build();
-    if exposure.is_none() {
-        // Always of this size, so that the window and `render` agree.
-        match suggest_exposure(&app.probe(PROBE, PROBE_SAMPLES)) {
-            Some(0.0) => {}
-            Some(stops) => {
-                app.world.resource_mut::<Display>().exposure = stops;
-                report.decisions.push(format!("the picture would be far off: exposed by {stops:+.2} EV"));
-            }
-            None => report.warnings.push("no light reaches the camera: the picture is black".to_owned()),
-        }
-    }
+    first_look::settle(&mut app, &mut report, &source.to_string(), exposure.is_none());
     let build_seconds = start.elapsed().as_secs_f64();
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
 }
@@ -163,10 +153,6 @@ pub struct SceneOrigin {
     /// How it was loaded.
     pub options: LoadOptions,
 }
-
-/// The picture that the exposure is chosen by.
-const PROBE: UVec2 = UVec2::new(96, 64);
-const PROBE_SAMPLES: u32 = 4;
 
 fn choose_camera(
     world: &mut World,

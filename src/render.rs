@@ -4,7 +4,7 @@ use crate::app::{FrameBudget, FrameStats};
 use crate::farm::{self, FilmError, FilmFile, Header, Identity, is_film};
 use crate::image::compare::{CompareError, LinearImage};
 use crate::image::{Display, ErrorLog, ImageError, save};
-use crate::load::{LoadOptions, SceneSource};
+use crate::load::{Kind, LoadOptions, Phase, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
 use crate::trace::{Film, Geometry, RayCounts, RenderSettings};
 use crate::watch::{Seen, Watch};
@@ -109,6 +109,8 @@ pub struct RenderSummary {
     pub resumed_samples: f64,
     /// Seconds of reading the files.
     pub load_seconds: f64,
+    /// Of these, by phase.
+    pub load_phases: Vec<(Phase, f64)>,
     /// Seconds of building the hierarchies and the other arrays.
     pub build_seconds: f64,
     /// Seconds of tracing.
@@ -166,10 +168,8 @@ pub fn render(
         planned = file.header.planned.as_ref().map(|range| range.end.saturating_sub(range.start));
         let film = file.resume(path, identity, job.wishes.first_sample)?;
         resumed_samples = film.mean_samples();
-        scene
-            .report
-            .decisions
-            .push(format!("{}: goes on from {resumed_samples:.0} samples per pixel", path.display()));
+        let what = format!("goes on from {resumed_samples:.0} samples per pixel");
+        scene.report.add(Kind::Decided, &path.display().to_string(), what);
         scene.app.world.insert_resource(film);
     }
     let size = scene.app.world.resource::<RenderSettings>().size;
@@ -287,8 +287,9 @@ pub fn render(
         noise,
         dropped_samples: stats.dropped,
         peak_memory_bytes: peak_memory(),
-        warnings: report.warnings,
-        decisions: report.decisions,
+        load_phases: report.seconds.clone(),
+        warnings: report.warnings(),
+        decisions: report.decisions(),
         outputs: job.outputs.iter().map(|p| p.display().to_string()).collect(),
         interrupted: matches!(end, End::Interrupted),
         out_of_time: match end {

@@ -84,14 +84,14 @@ fn exit_codes_are_those_of_the_documentation() {
     let folder = fresh("codes");
     std::fs::write(folder.join("broken.glb"), b"glTF but not really").unwrap();
     std::fs::write(folder.join("wrong.toml"), "[[light]]\nkind = \"sphere\"\nradius = -1\n").unwrap();
-    let needs = r#"{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
-        "extensionsUsed":["KHR_draco_mesh_compression"]}"#;
-    std::fs::write(folder.join("draco.gltf"), needs).unwrap();
+    let needs = r#"{"asset":{"version":"2.0"},"extensionsRequired":["MSFT_texture_dds"],
+        "extensionsUsed":["MSFT_texture_dds"]}"#;
+    std::fs::write(folder.join("needs.gltf"), needs).unwrap();
     let small = ["--spp", "1", "--resolution", "4x4"];
     for (arguments, code, words) in [
         (vec!["render", "nothing.glb", "-o", "a.png"], 3, vec!["nothing.glb"]),
         (vec!["render", "broken.glb", "-o", "a.png"], 3, vec!["broken.glb"]),
-        (vec!["render", "draco.gltf", "-o", "a.png"], 3, vec!["draco.gltf", "KHR_draco_mesh_compression"]),
+        (vec!["render", "needs.gltf", "-o", "a.png"], 3, vec!["needs.gltf", "MSFT_texture_dds"]),
         (vec!["render", "cornel", "-o", "a.png"], 3, vec!["cornel", "did you mean", "cornell"]),
         (vec!["nothing.glb"], 3, vec!["nothing.glb"]),
         (
@@ -235,4 +235,36 @@ fn camera_flags_move_the_camera() {
     let folder = support::folder("camera");
     let pixels = |name| image::open(folder.join(name)).unwrap().into_rgb32f().into_raw();
     assert_ne!(pixels("a.exr"), pixels("b.exr"));
+}
+
+#[test]
+fn a_check_says_how_files_fare_and_ends_with_the_worst() {
+    let folder = fresh("check");
+    std::fs::write(folder.join("good.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    std::fs::write(folder.join("odd.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\nl 2 3\n").unwrap();
+    std::fs::write(folder.join("bad.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    let check = |arguments: &[&str]| {
+        let output = penumbra(&folder, &[&["check"], arguments].concat());
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, said, errors) = check(&["good.obj", "cornell"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(
+        said.contains("good.obj: valid\n") && said.contains("1 triangles") && errors.is_empty(),
+        "{said}"
+    );
+    let (code, said, _) = check(&["good.obj", "odd.obj"]);
+    assert_eq!(code, Some(6), "{said}");
+    assert!(said.contains("ignored       lines (`l`) have no surface: 2 (line 5)"), "{said}");
+    let (code, said, _) = check(&["--json", "good.obj", "bad.obj", "odd.obj", "gone.obj"]);
+    assert_eq!(code, Some(3));
+    let cards: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let verdicts: Vec<&str> = cards.iter().map(|card| card["verdict"].as_str().unwrap()).collect();
+    assert_eq!(verdicts, ["valid", "refused", "repaired", "refused"]);
+    assert_eq!(
+        (&cards[0]["triangles"], &cards[0]["found"]["meshes"], &cards[2]["ignored"][0]["count"]),
+        (&1.into(), &1.into(), &2.into())
+    );
+    assert!(cards[1]["error"].as_str().unwrap().contains("bad.obj: line 2: index out of range"));
 }

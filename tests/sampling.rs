@@ -372,7 +372,8 @@ fn the_chi_square_finds_a_density_two_percent_wrong() {
 
 /// A place in the middle of a penumbra, so small that every pixel shows the same.
 fn flat_penumbra(width: u32, height: u32, strip: f64, seed: u32) -> Stage {
-    let mut stage = Stage::new(RenderSettings { seed, ..settings(width, height, Integrator::Direct, 1) });
+    let mut stage =
+        Stage::new(RenderSettings { seed, shafts: false, ..settings(width, height, Integrator::Direct, 1) });
     let here = DAffine3::IDENTITY;
     stage.add_mesh(quad(Vec3::new(-2.0, -2.0, 0.0), Vec3::X * 4.0, Vec3::Y * 4.0), Material::default(), here);
     stage.add_mesh(

@@ -17,14 +17,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use values::{exposure, isa, length, noise, radius, resolution, sample_range, seconds, vector, view_angle};
+use values::{
+    bytes, exposure, isa, length, noise, radius, resolution, sample_range, seconds, time, vector, view_angle,
+};
 
 /// Fly through a glTF or OBJ scene and watch its soft shadows converge.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
 #[command(
     after_help = "Exit codes: 0 done; 1 failed (also: a film is damaged or does not fit); 2 bad command line; 3 scene not readable; \
-4 stopped before the target; 5 --fail-above exceeded; 130 interrupted (what there was is saved)."
+4 stopped before the target; 5 --fail-above exceeded; 6 `check`: loads, but not all of it as it is in the file; 130 interrupted (what there was is saved)."
 )]
 pub struct Cli {
     /// What to do; nothing opens the window.
@@ -41,6 +43,8 @@ pub struct Cli {
 pub enum Command {
     /// Render to a file, without a window
     Render(RenderArgs),
+    /// Load files and say what was found, mended, left out and approximated
+    Check(CheckArgs),
     /// Say how much picture A differs from reference B
     Compare(CompareArgs),
     /// Make one picture of films that hold different samples of it
@@ -139,6 +143,9 @@ pub struct SceneArgs {
     /// Settings file to use instead of the .toml beside the scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
+    /// What of a file that holds several scenes, variants or poses.
+    #[command(flatten)]
+    pub part: PartArgs,
     /// Size of the picture
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     pub resolution: Option<UVec2>,
@@ -199,6 +206,61 @@ pub struct SceneArgs {
     /// What happens above white
     #[arg(long, value_enum)]
     pub tone_map: Option<ToneMapArg>,
+}
+
+/// What of a glTF file to load.
+#[derive(Debug, Args)]
+pub struct PartArgs {
+    /// Scene of a glTF file, by name or by number from 0 [default: the file's]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub gltf_scene: Option<String>,
+    /// Material variant of a glTF file, by name or by number from 0
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub variant: Option<String>,
+    /// Pose at this time of the animations, instead of the rest pose
+    #[arg(long, value_name = "SECONDS", value_parser = time)]
+    pub time: Option<f64>,
+    /// Animation to take the pose from, by name or by number from 0 [default: the first, and those of other things]
+    #[arg(long, value_name = "NAME|INDEX", requires = "time")]
+    pub animation: Option<String>,
+    /// Memory that loading may take, such as 2G or 500M [default: three quarters of what is free]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub max_memory: Option<u64>,
+}
+
+impl PartArgs {
+    fn load_options(&self, scene_settings: Option<PathBuf>) -> LoadOptions {
+        LoadOptions {
+            scene_settings,
+            scene: self.gltf_scene.clone(),
+            variant: self.variant.clone(),
+            time: self.time,
+            animation: self.animation.clone(),
+            max_memory: self.max_memory,
+            ..LoadOptions::default()
+        }
+    }
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Exit codes, the worst of all files: 0 valid; 6 loads, but something in it was mended, left out or \
+approximated; 3 refused."
+)]
+pub struct CheckArgs {
+    /// .gltf, .glb, .obj or .toml files, or built-in scenes
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<String>,
+    /// Settings file to use instead of the .toml beside each scene
+    #[arg(long, value_name = "FILE")]
+    pub scene_settings: Option<PathBuf>,
+    /// What of files that hold several scenes, variants or poses.
+    #[command(flatten)]
+    pub part: PartArgs,
+    /// Print one JSON object a file, each on a line
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `compare`.
@@ -386,7 +448,7 @@ impl SceneArgs {
     /// How to load it.
     #[must_use]
     pub fn load_options(&self) -> LoadOptions {
-        LoadOptions { scene_settings: self.scene_settings.clone() }
+        self.part.load_options(self.scene_settings.clone())
     }
 
     /// How it should look.
@@ -424,6 +486,14 @@ impl SceneArgs {
                 focus_distance: self.focus_distance,
             },
         }
+    }
+}
+
+impl CheckArgs {
+    /// How to load.
+    #[must_use]
+    pub fn load_options(&self) -> LoadOptions {
+        self.part.load_options(self.scene_settings.clone())
     }
 }
 

@@ -80,6 +80,27 @@ pub(super) fn sample_range(text: &str) -> Result<Range<u32>, String> {
     if range.is_empty() { Err(format!("\"{text}\" holds no sample")) } else { Ok(range) }
 }
 
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    let seconds: f64 =
+        text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if (0.0..=1e9).contains(&seconds) { Ok(seconds) } else { Err("must lie within 0 and 1e9".to_owned()) }
+}
+
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit: u64 =
+        match text[digits.len()..].to_ascii_uppercase().trim_end_matches("IB").trim_end_matches('B') {
+            "" => 1,
+            "K" => 1 << 10,
+            "M" => 1 << 20,
+            "G" => 1 << 30,
+            "T" => 1 << 40,
+            _ => return Err(format!("\"{text}\" is not a size such as 500M or 2G")),
+        };
+    let number: u64 = digits.parse().map_err(|_| format!("\"{text}\" is not a size such as 500M or 2G"))?;
+    number.checked_mul(unit).ok_or_else(|| format!("\"{text}\" is too large"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,5 +121,14 @@ mod tests {
         }
         assert!(vector("1,2").is_err() && vector("1,2,nan").is_err());
         assert!(sample_range("64..16").is_err() && view_angle("180").is_err() && exposure("nan").is_err());
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(
+            ["7", "2k", "500M", "1GiB", "3tb"].map(bytes),
+            [Ok(7), Ok(2 << 10), Ok(500 << 20), Ok(1 << 30), Ok(3 << 40)]
+        );
+        assert!(bytes("lots").is_err() && bytes("-1").is_err() && bytes("99999999T").is_err());
     }
 }

@@ -41,6 +41,32 @@ pub enum LoadError {
         /// What the user can do.
         way_out: &'static str,
     },
+    /// The user chose a scene, animation or variant that the file does not have.
+    #[error("{file}: no {kind} \"{wanted}\"; it has {names}")]
+    NotThere {
+        /// The file.
+        file: String,
+        /// Scene, animation or variant.
+        kind: &'static str,
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        names: String,
+    },
+    /// It would take more memory than loading may.
+    #[error(
+        "{file}: {place}: takes loading to {needed} MiB of memory, more than the {limit} MiB allowed; allow more with --max-memory"
+    )]
+    Memory {
+        /// The file.
+        file: String,
+        /// What of it.
+        place: String,
+        /// MiB that loading would have taken.
+        needed: u64,
+        /// MiB that it may take.
+        limit: u64,
+    },
     /// The content is damaged or contradicts itself.
     #[error("{file}: {place}: {problem}")]
     Broken {

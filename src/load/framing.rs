@@ -1,6 +1,6 @@
 //! What the program decides when a file has no camera or no light, and how large the scene is.
 
-use super::report::Sink;
+use super::report::{Kind, Sink};
 use crate::scene::{
     ActiveCamera, Camera, GlobalTransform, Instance, Light, Material, Mesh, Projection, SceneBounds,
     Transform, Visible, propagate_transforms,
@@ -11,11 +11,15 @@ use bevy_ecs::system::RunSystemOnce;
 use glam::{DVec3, Vec3};
 
 /// Triangles that are looked at to find the bounds.
-const MOST_SAMPLES: usize = 200_000;
+const MOST_SAMPLES: usize = 100_000;
 /// World coordinates beyond this cannot be traced.
 const FAR: f64 = 1e18;
-/// Share of the area beyond which a corner is an outlier, at each end of each axis.
+/// Share of the area, or of the triangles, beyond which a corner is an outlier, at each end of each axis.
 const OUTLIERS: f64 = 0.01;
+/// Few triangles count as outliers if they make the scene this much larger: far debris by area ...
+const FAR_DEBRIS: f64 = 4.0;
+/// ... and a large floor or backdrop by number.
+const BACKDROP: f64 = 3.0;
 /// Surfaces that face one side by more than this share of their area make that side the front.
 const ONE_SIDED: f64 = 0.08;
 /// Radiance of a white surface at the centre that faces the key light.
@@ -29,17 +33,18 @@ pub(super) fn complete(file: &str, camera: Option<Entity>, sink: &mut Sink<'_>) 
     drop_far_instances(file, sink);
     let survey = survey(sink.world);
     let bounds = survey.bounds.unwrap_or(Box3 { min: DVec3::splat(-1.0), max: DVec3::ONE });
-    let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-30);
+    let radius = (0.5 * bounds.diagonal()).max(1e-30);
     let ball = SceneBounds { center: 0.5 * (bounds.min + bounds.max), radius };
     sink.world.insert_resource(ball);
     if survey.bounds.is_none() {
-        sink.warn(format!("{file}: no triangle to see in it: the picture will be empty"));
+        sink.ignored(file, "", "no triangle to see in it: the picture will be empty");
     }
     let first = sink.report.cameras.first().map(|&(_, camera)| camera);
     let active = camera.or(first).unwrap_or_else(|| frame(file, &survey, &bounds, ball, sink));
     sink.world.insert_resource(ActiveCamera(active));
     if !has_light(sink.world) {
-        add_light(file, active, ball, sink);
+        add_light(sink.world, active, ball).into_iter().for_each(|light| sink.note_spawned(light));
+        sink.decide(file, format!("no light in it; {ADDED_LIGHT}"));
     }
     propagate(sink.world);
 }
@@ -54,6 +59,12 @@ fn propagate(world: &mut World) {
 struct Box3 {
     min: DVec3,
     max: DVec3,
+}
+
+impl Box3 {
+    fn diagonal(&self) -> f64 {
+        (self.max - self.min).length()
+    }
 }
 
 /// What a glance at the triangles says.
@@ -105,30 +116,51 @@ fn survey(world: &mut World) -> Survey {
     let Some(all) = all else {
         return Survey { bounds: None, facing, trimmed: false };
     };
-    let core = trimmed(&mut samples);
-    // Only far outliers are worth cutting off: they would leave the rest a speck.
-    let is_far = (all.max - all.min).length() > 4.0 * (core.max - core.min).length();
-    Survey { bounds: Some(if is_far { core } else { all }), facing, trimmed: is_far }
+    let [by_area, by_number] = trimmed(&mut samples);
+    // Only what leaves the rest a speck is worth cutting off.
+    let is_far = |core: &Box3, times: f64| all.diagonal() > times * core.diagonal();
+    let (bounds, trimmed) = if is_far(&by_area, FAR_DEBRIS) {
+        (by_area, true)
+    } else if is_far(&by_number, BACKDROP) && by_number.diagonal() > 0.0 {
+        (by_number, true)
+    } else {
+        (all, false)
+    };
+    Survey { bounds: Some(bounds), facing, trimmed }
 }
 
-/// The box between the first and last hundredth of the area along each axis.
-fn trimmed(samples: &mut [Sample]) -> Box3 {
+/// The boxes between the first and last hundredth along each axis: of the area, and of the triangles.
+fn trimmed(samples: &mut [Sample]) -> [Box3; 2] {
     let total: f64 = samples.iter().map(|sample| sample.area).sum();
-    let mut core = Box3 { min: DVec3::ZERO, max: DVec3::ZERO };
+    let number = samples.len() as f64;
+    let mut cores = [Box3 { min: DVec3::ZERO, max: DVec3::ZERO }; 2];
     for axis in 0..3 {
         samples.sort_unstable_by(|a, b| a.corner[axis].total_cmp(&b.corner[axis]));
-        core.min[axis] = inner_edge(samples.iter(), axis, OUTLIERS * total);
-        core.max[axis] = inner_edge(samples.iter().rev(), axis, OUTLIERS * total);
+        let edges = |weight: fn(&Sample) -> f64, outside: f64| {
+            [
+                inner_edge(samples.iter(), axis, weight, outside),
+                inner_edge(samples.iter().rev(), axis, weight, outside),
+            ]
+        };
+        let both = [edges(|sample| sample.area, OUTLIERS * total), edges(|_| 1.0, OUTLIERS * number)];
+        for (core, [min, max]) in cores.iter_mut().zip(both) {
+            (core.min[axis], core.max[axis]) = (min, max);
+        }
     }
-    core
+    cores
 }
 
-/// Coordinate of the first sample that has `outside` of the area behind it.
-fn inner_edge<'s>(samples: impl Iterator<Item = &'s Sample>, axis: usize, outside: f64) -> f64 {
+/// Coordinate of the first sample with more than `outside` of the weight at or before it.
+fn inner_edge<'s>(
+    samples: impl Iterator<Item = &'s Sample>,
+    axis: usize,
+    weight: fn(&Sample) -> f64,
+    outside: f64,
+) -> f64 {
     let mut passed = 0.0;
     for sample in samples {
-        passed += sample.area;
-        if passed >= outside {
+        passed += weight(sample);
+        if passed > outside {
             return sample.corner[axis];
         }
     }
@@ -158,10 +190,8 @@ fn drop_far_instances(file: &str, sink: &mut Sink<'_>) {
         sink.world.entity_mut(entity).remove::<Instance>();
     }
     if !far.is_empty() {
-        sink.warn(format!(
-            "{file}: {} instances left out: their transform takes them beyond the range of 1e18",
-            far.len()
-        ));
+        let what = "instances left out: their transform takes them beyond the range of 1e18";
+        sink.remark(Kind::Ignored, file, "", what.to_owned(), far.len());
     }
 }
 
@@ -188,8 +218,9 @@ fn frame(file: &str, survey: &Survey, bounds: &Box3, ball: SceneBounds, sink: &m
     let camera = sink.spawn((Name::new(name), transform, Camera { projection }));
     sink.report.cameras.push((name.to_owned(), camera));
     let side = if one_sided { "the side its surfaces face" } else { "the front, above and right" };
-    let rest = if survey.trimmed { "; far outliers are outside the picture" } else { "" };
-    sink.decide(format!("{file}: no camera in it; looks at the whole scene from {side}{rest}"));
+    let rest =
+        if survey.trimmed { "; a few triangles far outside of the rest are left out of account" } else { "" };
+    sink.decide(file, format!("no camera in it; looks at the whole scene from {side}{rest}"));
     camera
 }
 
@@ -208,10 +239,24 @@ fn has_light(world: &mut World) -> bool {
     instances.iter_manual(world).any(|instance| instance.materials.iter().any(shines))
 }
 
+/// How decisions name what [`light_for`] adds.
+pub(crate) const ADDED_LIGHT: &str =
+    "a soft key light shines from up left behind the camera, with a dim environment";
+
+/// Adds the light of a scene that has none: for a scene whose own light turns out to reach hardly anything.
+pub(crate) fn light_for(world: &mut World) {
+    let camera = world.get_resource::<ActiveCamera>().map(|active| active.0);
+    let ball = world.get_resource::<SceneBounds>().copied();
+    if let Some((camera, ball)) = camera.zip(ball) {
+        add_light(world, camera, ball);
+        propagate(world);
+    }
+}
+
 /// A key light up-left behind the camera, large enough for soft shadows, and a dim environment.
-fn add_light(file: &str, camera: Entity, ball: SceneBounds, sink: &mut Sink<'_>) {
-    propagate(sink.world);
-    let view = sink.world.get::<GlobalTransform>(camera).map_or_else(Default::default, |t| t.0);
+fn add_light(world: &mut World, camera: Entity, ball: SceneBounds) -> [Entity; 2] {
+    propagate(world);
+    let view = world.get::<GlobalTransform>(camera).map_or_else(Default::default, |t| t.0);
     let back = view.matrix3.z_axis.try_normalize().unwrap_or(DVec3::Z);
     let right = view.matrix3.x_axis.try_normalize().unwrap_or(DVec3::X);
     let towards = (back - 0.7 * right + DVec3::Y).try_normalize().unwrap_or(DVec3::Y);
@@ -227,11 +272,9 @@ fn add_light(file: &str, camera: Entity, ball: SceneBounds, sink: &mut Sink<'_>)
         radiance: [Vec3::splat(radiance as f32); 4],
         two_sided: false,
     };
-    sink.spawn((Name::new("key light"), transform, key, Visible(false)));
-    sink.spawn((
-        Name::new("environment"),
-        Transform::default(),
-        Light::Environment { radiance: Vec3::splat(FILL_RADIANCE) },
-    ));
-    sink.decide(format!("{file}: no light in it; a soft key light shines from up left behind the camera, with a dim environment"));
+    let environment = Light::Environment { radiance: Vec3::splat(FILL_RADIANCE) };
+    [
+        world.spawn((Name::new("key light"), transform, key, Visible(false))).id(),
+        world.spawn((Name::new("environment"), Transform::default(), environment)).id(),
+    ]
 }

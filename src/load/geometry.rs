@@ -1,6 +1,7 @@
 //! From what a file says about triangles to a [`TriangleMesh`] that keeps its promises.
 
-use crate::scene::TriangleMesh;
+use super::report::{Kind, Sink};
+use crate::scene::{Influences, Target, TriangleMesh};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// Coordinates beyond this are left out: their products overflow single precision.
@@ -15,6 +16,10 @@ pub(super) struct Part {
     pub(super) colors: Option<Vec<Vec4>>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) slot: u16,
+    /// Joints that carry the vertices, if the mesh has a skin.
+    pub(super) influences: Influences,
+    /// Morph targets, if it has any.
+    pub(super) targets: Vec<Target>,
 }
 
 /// A finished mesh and what happened on the way.
@@ -37,8 +42,8 @@ pub(super) struct Mended {
 }
 
 impl Mended {
-    /// One line for each kind.
-    pub(super) fn lines(&self) -> Vec<String> {
+    /// A remark for each kind.
+    pub(super) fn tell(&self, file: &str, place: &str, sink: &mut Sink<'_>) {
         let kinds = [
             (self.not_finite, "triangles dropped: a position is not finite"),
             (self.too_far, "triangles dropped: a position is beyond the range of 1e18"),
@@ -47,22 +52,32 @@ impl Mended {
             (self.uvs, "texture coordinates not finite, set to 0"),
             (self.colors, "vertex colours not finite, set to white"),
         ];
-        kinds.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect()
+        for (count, what) in kinds.into_iter().filter(|(count, _)| *count > 0) {
+            sink.remark(Kind::Repaired, file, place, what.to_owned(), count);
+        }
     }
 }
 
+/// Gives primitives without normals, beside others with them, vertices of their own with face normals.
+pub(super) fn faceted_beside_smooth(mut parts: Vec<Part>) -> Vec<Part> {
+    if parts.iter().any(|part| part.normals.is_some()) {
+        for part in parts.iter_mut().filter(|part| part.normals.is_none()) {
+            *part = faceted(part);
+        }
+    }
+    parts
+}
+
 /// Puts primitives into one mesh. Where only some have an attribute, the others get its neutral
-/// value; one without normals beside others with them gets its own vertices and face normals.
+/// value, and face normals.
 pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
+    let parts = faceted_beside_smooth(parts);
     let any_normals = parts.iter().any(|part| part.normals.is_some());
     let any_uvs = parts.iter().any(|part| part.uvs.is_some());
     let any_colors = parts.iter().any(|part| part.colors.is_some());
     let several_slots = parts.iter().any(|part| part.slot != 0);
     let mut mesh = TriangleMesh::default();
     for mut part in parts {
-        if any_normals && part.normals.is_none() {
-            part = faceted(&part);
-        }
         let first = mesh.positions.len() as u32;
         let count = part.positions.len();
         mesh.triangles.extend(part.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
@@ -96,6 +111,8 @@ fn faceted(part: &Part) -> Part {
         triangles: (0..part.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         positions,
         slot: part.slot,
+        influences: part.influences.of(corners()),
+        targets: part.targets.iter().map(|target| target.of(corners())).collect(),
     }
 }
 
@@ -108,12 +125,13 @@ pub(super) fn unit_normal(corners: [Vec3; 3]) -> Option<Vec3> {
 }
 
 /// Drops what cannot be traced and mends what can, so that every promise of [`TriangleMesh`] holds.
-pub(super) fn finish(mut mesh: TriangleMesh) -> Finished {
+/// With `keep_flat`, triangles without area stay.
+pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
     let not_finite = retain(&mut mesh, |corners| corners.iter().all(|p| p.is_finite()));
     let mut mended = Mended { not_finite, ..Mended::default() };
     let triangles = mesh.triangles.len();
     mended.too_far = retain(&mut mesh, |corners| corners.iter().all(|p| p.abs().max_element() <= FAR));
-    mended.without_area = mesh.drop_degenerate();
+    mended.without_area = if keep_flat { 0 } else { mesh.drop_degenerate() };
     mend_normals(&mut mesh, &mut mended);
     for uv in &mut mesh.uvs {
         if !uv.is_finite() {
@@ -199,7 +217,7 @@ mod tests {
         flat.positions[2] = flat.positions[1];
         let mut far = triangle(0.0);
         far.positions[0].x = f32::NAN;
-        let done = finish(merge(vec![flat, far, triangle(0.0)]));
+        let done = finish(merge(vec![flat, far, triangle(0.0)]), false);
         assert_eq!((done.triangles, done.mesh.triangles.len()), (2, 1));
         assert_eq!((done.mended.not_finite, done.mended.without_area), (1, 1));
     }
@@ -208,7 +226,7 @@ mod tests {
     fn zero_normals_become_face_normals() {
         let part =
             Part { normals: Some(vec![Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X * 3.0]), ..triangle(0.0) };
-        let done = finish(merge(vec![part]));
+        let done = finish(merge(vec![part]), false);
         assert_eq!(done.mesh.normals, [Vec3::Z, Vec3::Z, Vec3::X]);
     }
 

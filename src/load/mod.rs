@@ -9,11 +9,14 @@
 //! No file can make it panic, recurse without bound, open another machine's files, or allocate what
 //! is not there: every count is checked against the bytes that must hold it.
 
+mod budget;
 mod builtin;
+mod card;
 mod error;
 mod framing;
 mod geometry;
 mod gltf;
+mod ktx2;
 mod obj;
 mod picture;
 mod report;
@@ -21,16 +24,20 @@ pub mod settings;
 mod source;
 
 pub use builtin::{BuiltIn, built_in_scenes};
+pub use card::{Card, Verdict};
 pub use error::{LoadError, ReadError};
-pub use report::LoadReport;
+pub(crate) use framing::{ADDED_LIGHT, light_for};
+pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
-use crate::scene::Transform;
+use crate::scene::{Playing, Transform, deform, play, propagate_transforms};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
+use bevy_ecs::system::RunSystemOnce;
 use report::Sink;
 use settings::{Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Where a scene comes from.
@@ -73,11 +80,33 @@ impl SceneSource {
     }
 }
 
+impl fmt::Display for SceneSource {
+    /// The path, or the name of the built-in scene.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::BuiltIn(name) => f.write_str(name),
+        }
+    }
+}
+
 /// What the caller wants from [`load`].
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     /// Sidecar to use instead of the one beside the scene.
     pub scene_settings: Option<PathBuf>,
+    /// Which scene of a glTF file, by name or by number from 0, instead of its default.
+    pub scene: Option<String>,
+    /// Which material variant of a glTF file (`KHR_materials_variants`), by name or by number from 0.
+    pub variant: Option<String>,
+    /// Pose at this many seconds of its animations, instead of the rest pose.
+    pub time: Option<f64>,
+    /// Bytes of memory that loading may take, instead of three quarters of what the machine has left.
+    pub max_memory: Option<u64>,
+    /// Who is told how far it is.
+    pub watcher: Watcher,
+    /// Which animation, by name or by number from 0, instead of the first and those of other things.
+    pub animation: Option<String>,
 }
 
 /// Reads a scene into the world and derives its `GlobalTransform`s.
@@ -85,9 +114,9 @@ pub struct LoadOptions {
 /// # Errors
 /// A [`LoadError`] that names the file and the place in it; then nothing was added to the world.
 pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> Result<LoadReport, LoadError> {
-    let mut sink = Sink::new(world);
+    let mut sink = Sink::new(world, options);
     match load_into(source, options, &mut sink) {
-        Ok(()) => Ok(sink.finish()),
+        Ok(()) => Ok(sink.finish(&source.to_string())),
         Err(error) => {
             sink.undo();
             Err(error)
@@ -96,7 +125,7 @@ pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> R
 }
 
 fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -> Result<(), LoadError> {
-    let (file, folder, bytes) = open(source)?;
+    let (file, folder, bytes) = open(source, sink)?;
     let format = Format::of(&file, &bytes)?;
     let mut settings = Vec::new();
     if format == Format::Settings {
@@ -124,13 +153,28 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     for settings in &settings {
         settings.apply_edits(sink)?;
     }
+    sink.begin(Phase::Framing);
+    pose(sink.world);
     for name in materials.unused() {
-        let line =
-            format!("{file}: [material.{name}] in the settings: no material of that name in the scene");
-        sink.warn(line);
+        sink.ignored(
+            &file,
+            &format!("[material.{name}]"),
+            "settings for a material that is not in the scene",
+        );
     }
+    sink.count();
     framing::complete(&file, active, sink);
     Ok(())
+}
+
+/// Brings meshes into the shape that their weights and joints, animated or not, ask for.
+fn pose(world: &mut World) {
+    // None of these systems has a parameter that could be missing.
+    if world.contains_resource::<Playing>() {
+        let _ = world.run_system_once(play);
+    }
+    let _ = world.run_system_once(propagate_transforms);
+    let _ = world.run_system_once(deform);
 }
 
 /// What a file holds.
@@ -154,10 +198,12 @@ impl Format {
     }
 }
 
-fn open(source: &SceneSource) -> Result<(String, Folder, Bytes), LoadError> {
+fn open(source: &SceneSource, sink: &Sink<'_>) -> Result<(String, Folder, Bytes), LoadError> {
     match source {
         SceneSource::File(path) => {
             let file = path.to_string_lossy().into_owned();
+            let length = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+            sink.budget.take(length, &file, "the file itself")?;
             match source::read_file(path, SCENE_LIMIT) {
                 Ok(bytes) => Ok((file, Folder::of(path), bytes)),
                 Err(source) => Err(LoadError::Read { file, source }),
@@ -193,15 +239,13 @@ fn sidecar(
         .map_err(|source| LoadError::Read { file: file.clone(), source })?;
     let settings = Settings::parse(&file, Folder::of(&path), &bytes)?;
     if settings.has_models() && !asked_for {
-        sink.decide(format!(
-            "{file}: has [[model]] and so is a scene of its own, not the settings of this one"
-        ));
+        sink.decide(&file, "has [[model]] and so is a scene of its own, not the settings of this one");
         return Ok(None);
     }
     if settings.has_models() {
-        sink.warn(format!("{file}: its [[model]] tables are ignored; open the file itself to see them"));
+        sink.ignored(&file, "", "its [[model]] tables; open the file itself to see them");
     } else {
-        sink.decide(format!("{file}: settings read"));
+        sink.decide(&file, "settings read");
     }
     Ok(Some(settings))
 }

@@ -1,7 +1,8 @@
 //! Image files → texels. A picture that cannot be had is a warning and a magenta checker, never an error.
 
 use super::error::ReadError;
-use super::report::Sink;
+use super::ktx2;
+use super::report::{Kind, Phase, Sink};
 use crate::scene::Texels;
 use image::error::ImageError;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
@@ -9,11 +10,10 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Most texels of one picture: 8192 squared, 256 MiB decoded.
 const MOST_TEXELS: u64 = 1 << 26;
-/// Most texels of all pictures of a file together: 2 GiB decoded.
-const MOST_TEXELS_TOGETHER: u64 = 1 << 29;
 
 /// A picture to decode.
 pub(super) struct Picture<'a> {
@@ -25,30 +25,37 @@ pub(super) struct Picture<'a> {
     pub(super) strict: bool,
 }
 
+/// What happened to a picture.
+struct Note(Kind, String);
+
 /// Decodes all pictures side by side; `file` is the scene that names them.
 pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Arc<Texels>> {
-    let mut budget = MOST_TEXELS_TOGETHER;
+    // Decoders need as much again for a while.
     let affordable: Vec<bool> = pictures
         .iter()
         .map(|picture| {
             let texels = picture.bytes.as_ref().ok().and_then(|bytes| texel_count(bytes)).unwrap_or(0);
-            let fits = texels <= budget;
-            budget -= if fits { texels } else { 0 };
-            fits
+            sink.budget.take(8 * texels, file, &picture.label).is_ok()
         })
         .collect();
-    let decoded: Vec<(Arc<Texels>, Vec<String>)> = pictures
+    let done = AtomicUsize::new(0);
+    let watcher = &sink.options.watcher;
+    let decoded: Vec<(Arc<Texels>, Vec<Note>)> = pictures
         .par_iter()
         .zip(affordable)
         .map(|(picture, affordable)| {
+            let part = done.fetch_add(1, Ordering::Relaxed) as f32 / pictures.len() as f32;
+            watcher.tell(Phase::Images, part);
             let mut remarks = Vec::new();
             let result = match &picture.bytes {
                 Err(why) => Err(format!("image {why}")),
-                Ok(_) if !affordable => Err("image left out: the pictures together are too large".to_owned()),
+                Ok(_) if !affordable => {
+                    Err("image left out: too large for the memory allowed (see --max-memory)".to_owned())
+                }
                 Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
             };
             let texels = result.unwrap_or_else(|why| {
-                remarks.push(format!("{why}; a magenta checker stands in"));
+                remarks.push(Note(Kind::Ignored, format!("{why}; a magenta checker stands in")));
                 stand_in()
             });
             (Arc::new(texels), remarks)
@@ -58,8 +65,8 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
         .into_iter()
         .zip(pictures)
         .map(|((texels, remarks), picture)| {
-            for remark in remarks {
-                sink.warn(format!("{file}: {}: {remark}", picture.label));
+            for Note(kind, what) in remarks {
+                sink.remark(kind, file, &picture.label, what, 1);
             }
             texels
         })
@@ -74,13 +81,19 @@ pub(super) fn stand_in() -> Texels {
 }
 
 fn texel_count(bytes: &[u8]) -> Option<u64> {
+    if let Some([width, height]) = ktx2::size(bytes) {
+        return Some(u64::from(width) * u64::from(height));
+    }
     let (width, height) =
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
 }
 
 /// Decodes one picture, by its first bytes and not by its name.
-fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texels, String> {
+fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels, String> {
+    if ktx2::size(bytes).is_some() {
+        return ktx2::decode(bytes, MOST_TEXELS);
+    }
     if let Some(format) = foreign_format(bytes) {
         return Err(format!("image format {format} is not supported"));
     }
@@ -91,10 +104,11 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texel
         return Err("image format not recognised".to_owned());
     };
     if strict && !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP) {
-        remarks.push(format!("image format {format:?} is not allowed in glTF; used all the same"));
+        let what = format!("image format {format:?} is not allowed in glTF; used all the same");
+        remarks.push(Note(Kind::Repaired, what));
     }
     if format == ImageFormat::Jpeg && !has_jpeg_end(bytes) {
-        remarks.push("JPEG image is truncated; the missing part is grey".to_owned());
+        remarks.push(Note(Kind::Repaired, "JPEG image is truncated; the missing part is grey".to_owned()));
     }
     let mut decoder = reader.into_decoder().map_err(|error| describe(&error))?;
     let (width, height) = decoder.dimensions();
@@ -109,10 +123,11 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<String>) -> Result<Texel
     limits.max_alloc = Some(16 * MOST_TEXELS);
     decoder.set_limits(limits).map_err(|error| describe(&error))?;
     if format == ImageFormat::Jpeg && jpeg_components(bytes) == Some(4) {
-        remarks.push("CMYK JPEG image: its colours are approximate".to_owned());
+        remarks.push(Note(Kind::Approximated, "CMYK JPEG image: its colours are approximate".to_owned()));
     }
     if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
-        remarks.push("image with high dynamic range: cut at 1 and kept in 8 bits".to_owned());
+        let what = "image with high dynamic range: cut at 1 and kept in 8 bits";
+        remarks.push(Note(Kind::Approximated, what.to_owned()));
     }
     let rgba = image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
     let (width, height) = rgba.dimensions();
@@ -131,12 +146,8 @@ fn describe(error: &ImageError) -> String {
 
 /// Formats that scenes refer to and that are not decoded.
 fn foreign_format(bytes: &[u8]) -> Option<&'static str> {
-    const MAGIC: [(&[u8], &str); 4] = [
-        (b"\xabKTX 20\xbb", "KTX2 (KHR_texture_basisu)"),
-        (b"\xabKTX 11\xbb", "KTX"),
-        (b"DDS ", "DDS"),
-        (b"sB", "Basis Universal"),
-    ];
+    const MAGIC: [(&[u8], &str); 3] =
+        [(b"\xabKTX 11\xbb", "KTX"), (b"DDS ", "DDS"), (b"sB", "Basis Universal")];
     MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, name)| name)
 }
 

@@ -3,9 +3,11 @@
 //! Everything is linear: lengths in scene units (glTF: metres), angles in radians, colours and
 //! radiances as linear RGB with Rec. 709 primaries. The world is right-handed, +Y up.
 
+pub mod animation;
 pub mod bounds;
 pub mod camera;
 pub mod color;
+pub mod deform;
 pub mod hidden;
 pub mod light;
 pub mod material;
@@ -14,8 +16,10 @@ pub mod path;
 pub mod texture;
 pub mod transform;
 
+pub use animation::{Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, play};
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Camera, Lens, Projection};
+pub use deform::{Deform, Influences, Skin, Target, deform};
 pub use hidden::Hidden;
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, TextureUse};

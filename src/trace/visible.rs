@@ -84,6 +84,13 @@ pub fn irradiance(
     if geometric != normal {
         piece = piece.inside(geometric);
     }
+    // Nothing cuts it: to the bit what it is where nobody asks.
+    let reached =
+        |i: u32| which >> i & 1 == 1 && blockers[i as usize].reaches(&piece, point, &mut [Vec3::ZERO; 4]);
+    let all_above = quad.is_above(point, normal) && quad.is_above(point, geometric);
+    if all_above && !(0..blockers.len() as u32).any(reached) {
+        return Some(quad.irradiance(point, normal).abs());
+    }
     let sum = seen(piece, normal, point, blockers, which, &mut budget);
     (budget > 0).then_some(sum.abs())
 }
@@ -161,11 +168,13 @@ impl Job for Reach<'_> {
                 let first = a.cross(b);
                 let side = first.dot(c);
                 let sign = if side > 0.0 { 1.0 } else { -1.0 };
-                let (out_0, in_0) = sides(first * sign, &lamp);
-                let (out_1, in_1) = sides(b.cross(c) * sign, &lamp);
-                let (out_2, in_2) = sides(c.cross(if triangle { a } else { d }) * sign, &lamp);
-                let (out_3, in_3) = sides(d.cross(a) * sign, &lamp);
-                let outside = (out_0 | out_1 | out_2 | (out_3 & !triangle)) | (side == 0.0);
+                let far = size(lamp[0]) + size(lamp[2]);
+                let (out_0, in_0) = sides(first * sign, size(a) * size(b) * far, &lamp);
+                let (out_1, in_1) = sides(b.cross(c) * sign, size(b) * size(c) * far, &lamp);
+                let last = if triangle { a } else { d };
+                let (out_2, in_2) = sides(c.cross(last) * sign, size(c) * size(last) * far, &lamp);
+                let (out_3, in_3) = sides(d.cross(a) * sign, size(d) * size(a) * far, &lamp);
+                let outside = out_0 | out_1 | out_2 | (out_3 & !triangle);
                 let inside = in_0 & in_1 & in_2 & (in_3 | triangle) & !outside;
                 let bit = if outside { 0 } else { 1 << number };
                 *which |= if inside { HIDDEN } else { bit };
@@ -174,11 +183,20 @@ impl Job for Reach<'_> {
     }
 }
 
-/// Whether all of a lamp is outside of a plane, and whether all is inside.
+/// Sum of the coordinates without sign: no less than the length, and sooner known.
 #[inline(always)]
-fn sides(plane: Vec3, lamp: &[Vec3; 4]) -> (bool, bool) {
+fn size(p: Vec3) -> f32 {
+    p.x.abs() + p.y.abs() + p.z.abs()
+}
+
+/// Whether all of a lamp is surely outside of a plane, and whether all is surely inside, whatever the rounding, which is in
+/// proportion to `scale`.
+#[inline(always)]
+fn sides(plane: Vec3, scale: f32, lamp: &[Vec3; 4]) -> (bool, bool) {
+    let margin = scale * 1e-6;
     let (a, b, c, d) = (plane.dot(lamp[0]), plane.dot(lamp[1]), plane.dot(lamp[2]), plane.dot(lamp[3]));
-    ((a <= 0.0) & (b <= 0.0) & (c <= 0.0) & (d <= 0.0), (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0))
+    let outside = (a < -margin) & (b < -margin) & (c < -margin) & (d < -margin);
+    (outside, (a > margin) & (b > margin) & (c > margin) & (d > margin))
 }
 
 impl Blocker {
@@ -212,7 +230,9 @@ impl Blocker {
     /// Whether it may hide some of the piece. Then `planes` are the inward normals of those through `point` and its
     /// edges.
     fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; 4]) -> bool {
-        let [a, b, c, d] = self.corners.map(|p| p - point);
+        // Close to an edge the plane through it would be mostly rounding in single precision.
+        let point = point.as_dvec3();
+        let [a, b, c, d] = self.corners.map(|p| p.as_dvec3() - point);
         let first = a.cross(b);
         let side = first.dot(c);
         // Seen edge-on.
@@ -220,20 +240,20 @@ impl Blocker {
             return false;
         }
         let sign = side.signum();
-        planes[0] = first * sign;
+        planes[0] = (first * sign).as_vec3();
         if piece.is_outside(planes[0]) {
             return false;
         }
-        planes[1] = b.cross(c) * sign;
+        planes[1] = (b.cross(c) * sign).as_vec3();
         if piece.is_outside(planes[1]) {
             return false;
         }
         if self.count == 3 {
-            planes[2] = c.cross(a) * sign;
+            planes[2] = (c.cross(a) * sign).as_vec3();
             return !piece.is_outside(planes[2]);
         }
-        planes[2] = c.cross(d) * sign;
-        planes[3] = d.cross(a) * sign;
+        planes[2] = (c.cross(d) * sign).as_vec3();
+        planes[3] = (d.cross(a) * sign).as_vec3();
         !piece.is_outside(planes[2]) && !piece.is_outside(planes[3])
     }
 }

@@ -16,7 +16,7 @@ fn sees(world: &World, point: DVec3) -> bool {
 #[test]
 fn a_file_without_camera_and_light_gets_both_and_says_so() {
     let (mut world, report) = loaded("a.obj", &format!("{QUAD}f 1 2 3 4\n"));
-    let decisions = report.decisions.join("\n");
+    let decisions = report.decisions().join("\n");
     assert_says(&decisions, "no camera in it");
     assert_says(&decisions, "no light in it");
     for corner in [[0., 0.], [1., 0.], [1., 1.], [0., 1.]] {
@@ -52,7 +52,7 @@ fn far_outliers_do_not_shrink_the_scene() {
     text += "v 100000 0 0\nv 100000 0.01 0\nv 100000 0 0.01\nf -3 -2 -1\n";
     let (world, report) = loaded("a.obj", &text);
     assert!(world.resource::<SceneBounds>().radius < 3.0);
-    assert_says(&report.decisions.join("\n"), "outliers");
+    assert_says(&report.decisions().join("\n"), "a few triangles far outside");
 }
 
 #[test]
@@ -66,6 +66,20 @@ fn an_emissive_material_is_light_enough() {
 fn an_empty_scene_still_has_a_camera() {
     let (world, report) = loaded("a.obj", "# nothing\n");
     assert_eq!(report.triangles, 0);
-    assert_says(&report.warnings.join("\n"), "nothing to see");
+    assert_says(&report.warnings().join("\n"), "nothing to see");
     assert!(world.get::<Camera>(world.resource::<ActiveCamera>().0).is_some());
+}
+
+#[test]
+fn a_large_floor_does_not_shrink_what_stands_on_it() {
+    use std::fmt::Write;
+    let mut text = String::from("v -50 0 -50\nv 50 0 -50\nv 50 0 50\nv -50 0 50\nf 1 4 3 2\n");
+    for i in 0..300 {
+        let (x, y) = (f64::from(i % 20) * 0.05, f64::from(i / 20) * 0.05);
+        writeln!(text, "v {x} {y} 0\nv {x} {} 0\nv {} {y} 0.1\nf -3 -2 -1", y + 0.05, x + 0.05).unwrap();
+    }
+    let (world, report) = loaded("a.obj", &text);
+    let bounds = *world.resource::<SceneBounds>();
+    assert!(bounds.radius < 1.5 && bounds.center.length() < 2.0, "{bounds:?}");
+    assert_says(&report.decisions().join("\n"), "a few triangles far outside");
 }

@@ -10,7 +10,7 @@ fn a_primitive_without_normals_or_indices_is_flat_and_light_grey() {
     assert!(mesh.normals.is_empty());
     assert_eq!(mesh.uvs[2], Vec2::new(0.0, 1.0));
     assert_eq!(named::<Material>(&mut world, "default"), Material::default());
-    assert_says(&report.decisions.join("\n"), "light grey");
+    assert_says(&report.decisions().join("\n"), "light grey");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn materials_keep_their_factors_textures_and_samplers() {
         "textures":[{"source":0,"sampler":0}],"samplers":[{"magFilter":9728,"wrapS":33071,"wrapT":33648}],"images":[{"uri":"a%20b.png"}]"#;
     let text = gltf_triangle("", r#","material":0"#, more);
     let (mut world, report) = loaded_all(&[("a.gltf", text.as_bytes()), ("a b.png", &png([1, 2, 3, 4]))]);
-    assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+    assert!(report.warnings().is_empty(), "{:?}", report.warnings());
     let material = named::<Material>(&mut world, "m");
     assert_eq!(
         (material.base_color, material.opacity, material.alpha),
@@ -165,7 +165,7 @@ fn punctual_lights_are_photometric_and_keep_their_angles() {
         lights(&mut world),
         [Light::Spot { intensity: Vec3::new(1.0, 0.5, 0.0), inner_angle: 0.25, outer_angle: 0.5 }]
     );
-    assert_says(&report.decisions.join("\n"), "candela");
+    assert_says(&report.decisions().join("\n"), "candela");
 }
 
 #[test]
@@ -191,14 +191,14 @@ fn cameras_are_listed_and_the_first_is_active() {
 
 #[test]
 fn extensions_are_named_when_required_and_warned_of_when_used() {
-    let with = |key: &str| gltf_triangle("", "", &format!(r#","{key}":["KHR_draco_mesh_compression"]"#));
+    let with = |key: &str| gltf_triangle("", "", &format!(r#","{key}":["MSFT_texture_dds"]"#));
     let message = refusal("scene.gltf", &with("extensionsRequired"));
     assert_says(
         &message,
-        "scene.gltf: needs KHR_draco_mesh_compression, which Penumbra cannot read; export it again without Draco compression",
+        "scene.gltf: needs MSFT_texture_dds, which Penumbra cannot read; export it again with PNG, JPEG or WebP textures",
     );
     let (_, report) = loaded("a.gltf", &with("extensionsUsed"));
-    assert_says(&report.warnings.join("\n"), "KHR_draco_mesh_compression");
+    assert_says(&report.warnings().join("\n"), "MSFT_texture_dds");
 }
 
 #[test]
@@ -252,4 +252,49 @@ fn a_skinned_mesh_stands_where_its_joints_are() {
     assert_eq!(only_mesh(&mut world).positions[0], Vec3::Y * 5.0);
     let transform = world.query_filtered::<&GlobalTransform, With<Instance>>().single(&world).unwrap();
     assert_eq!(transform.0, DAffine3::IDENTITY);
+}
+
+#[test]
+fn memory_is_asked_for_before_it_is_taken() {
+    // A hundred primitives of two million vertices that no byte of the file stands for.
+    let zeros = r#"{"componentType":5126,"count":2000000,"type":"VEC3"}"#;
+    let primitives = vec![r#"{"attributes":{"POSITION":0}}"#; 100].join(",");
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"accessors":[{zeros}],"meshes":[{{"primitives":[{primitives}]}}]}}"#
+    );
+    let options = LoadOptions { max_memory: Some(1 << 30), ..LoadOptions::default() };
+    let (_, refused) = Folder::new(&[("a.gltf", text.as_bytes())]).load_with("a.gltf", &options);
+    let message = refused.unwrap_err().to_string();
+    assert_says(&message, "a.gltf: mesh 0, primitive 3: takes loading to");
+    assert_says(&message, "allow more with --max-memory");
+    // A picture that does not fit is a stand-in.
+    let more = r#","materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"textures":[{"source":0}],"images":[{"uri":"a.png"}]"#;
+    let text = gltf_triangle("", r#","material":0"#, more);
+    let folder = Folder::new(&[("a.gltf", text.as_bytes()), ("a.png", &png_of(512))]);
+    let options = LoadOptions { max_memory: Some(1 << 20), ..LoadOptions::default() };
+    let (_, report) = folder.load_with("a.gltf", &options);
+    assert_says(&report.unwrap().warnings().join("\n"), "too large for the memory allowed");
+}
+
+#[test]
+fn nodes_that_are_not_visible_are_left_out_with_all_below() {
+    let nodes = r#""nodes":[{"children":[1],"extensions":{"KHR_node_visibility":{"visible":false}}},{"mesh":0},{"mesh":0}],"#;
+    let text = gltf_triangle("", "", "")
+        .replace(r#""nodes":[{"mesh":0}],"#, nodes)
+        .replace(r#"{"nodes":[0]}"#, r#"{"nodes":[0,2]}"#);
+    let (_, report) = loaded("a.gltf", &text);
+    assert_eq!(report.triangles, 1);
+    assert_says(&report.decisions().join("\n"), "nodes that are not visible");
+}
+
+#[test]
+fn a_texture_that_an_extension_gives_comes_before_the_core_one() {
+    let more = r#","materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+        "textures":[{"source":0,"extensions":{"EXT_texture_webp":{"source":1}}}],"images":[{"uri":"a.png"},{"uri":"b.webp"}]"#;
+    let text = gltf_triangle("", r#","material":0"#, more);
+    let webp = picture(&[9, 8, 7, 255], 1, image::ImageFormat::WebP);
+    let (mut world, report) =
+        loaded_all(&[("a.gltf", text.as_bytes()), ("a.png", &png([1, 2, 3, 4])), ("b.webp", &webp)]);
+    assert!(report.warnings().is_empty(), "{:?}", report.warnings());
+    assert_eq!(world.query::<&Texture>().single(&world).unwrap().texels.texels, [[9, 8, 7, 255]]);
 }

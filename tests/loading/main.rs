@@ -2,9 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod animation;
+mod builder;
+mod compressed;
 mod framing;
 mod gltf;
 mod obj;
+mod obj_words;
 mod settings;
 
 use bevy_ecs::name::Name;
@@ -128,16 +132,19 @@ fn gltf_triangle(node: &str, primitive: &str, more: &str) -> String {
 
 /// A PNG of one texel of this colour.
 fn png(color: [u8; 4]) -> Vec<u8> {
+    picture(&color, 1, image::ImageFormat::Png)
+}
+
+/// A white PNG of this side.
+fn png_of(side: u32) -> Vec<u8> {
+    picture(&vec![255; (4 * side * side) as usize], side, image::ImageFormat::Png)
+}
+
+/// A square picture of these RGBA bytes.
+fn picture(rgba: &[u8], side: u32, format: image::ImageFormat) -> Vec<u8> {
     let mut bytes = Vec::new();
-    image::write_buffer_with_format(
-        &mut std::io::Cursor::new(&mut bytes),
-        &color,
-        1,
-        1,
-        image::ColorType::Rgba8,
-        image::ImageFormat::Png,
-    )
-    .unwrap();
+    let mut writer = std::io::Cursor::new(&mut bytes);
+    image::write_buffer_with_format(&mut writer, rgba, side, side, image::ColorType::Rgba8, format).unwrap();
     bytes
 }
 
@@ -151,15 +158,15 @@ fn every_built_in_scene_loads_without_a_warning() {
         let mut world = World::new();
         let report =
             load(&mut world, &source, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-        assert!(report.warnings.is_empty(), "{}: {:?}", scene.name, report.warnings);
+        assert!(report.warnings().is_empty(), "{}: {:?}", scene.name, report.warnings());
         assert!(report.triangles > 0 && !report.cameras.is_empty(), "{}", scene.name);
         let shines = world.query::<&Light>().iter(&world).count()
             + world.query::<&Material>().iter(&world).filter(|m| m.emission != Vec3::ZERO).count();
         assert!(shines > 0, "{}: dark", scene.name);
         assert!(
-            !report.decisions.iter().any(|line| line.contains("no light") || line.contains("no camera")),
+            !report.decisions().iter().any(|line| line.contains("no light") || line.contains("no camera")),
             "{:?}",
-            report.decisions
+            report.decisions()
         );
     }
 }

@@ -26,7 +26,7 @@ fn materials_may_change_with_every_face() {
     let blue = named::<Material>(&mut world, "blue");
     assert!((blue.base_color.z - 2.0 / 3.0).abs() < 1e-6);
     assert!(matches!(blue.glossy, Glossy::BlinnPhong { exponent, .. } if exponent == 50.0));
-    assert_says(&report.warnings.join("\n"), "would create light");
+    assert_says(&report.warnings().join("\n"), "would create light");
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn vertex_colours_are_kept() {
 #[test]
 fn a_missing_library_is_a_warning_that_names_it() {
     let (_, report) = loaded("a.obj", &format!("mtllib gone.mtl\nusemtl x\n{QUAD}f 1 2 3\n"));
-    let warnings = report.warnings.join("\n");
+    let warnings = report.warnings().join("\n");
     assert_says(&warnings, "gone.mtl");
     assert_says(&warnings, "`x` is not defined");
 }
@@ -90,7 +90,7 @@ fn a_missing_library_is_a_warning_that_names_it() {
 #[test]
 fn libraries_outside_the_folder_are_not_opened() {
     let (_, report) = loaded("a.obj", &format!("mtllib ../../etc/hostname\n{QUAD}f 1 2 3\n"));
-    assert_says(&report.warnings.join("\n"), "outside");
+    assert_says(&report.warnings().join("\n"), "outside");
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn a_missing_texture_shows_a_checker_and_a_warning() {
     let text = format!("mtllib A.MTL\nusemtl m\n{QUAD}f 1 2 3\n");
     let mtl = b"newmtl m\nmap_Kd -s 2 4 1 -clamp on C:\\textures\\no such.png\n";
     let (mut world, report) = loaded_all(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]);
-    assert_says(&report.warnings.join("\n"), "no such.png");
+    assert_says(&report.warnings().join("\n"), "no such.png");
     let texture = world.query::<&Texture>().single(&world).unwrap();
     assert_eq!((texture.texels.texels[0], texture.wrap), ([255, 0, 255, 255], [Wrap::Clamp; 2]));
 }
@@ -131,7 +131,7 @@ fn broken_lines_are_named() {
 fn numbers_too_large_drop_their_triangles_with_a_warning() {
     let (_, report) = loaded("a.obj", "v 1e400 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 2 3 4\n");
     assert_eq!(report.triangles, 1);
-    assert_says(&report.warnings.join("\n"), "not finite");
+    assert_says(&report.warnings().join("\n"), "not finite");
 }
 
 #[test]

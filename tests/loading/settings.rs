@@ -56,13 +56,13 @@ fn the_sidecar_adds_lights_camera_materials_and_render_options() {
     let camera = world.resource::<ActiveCamera>().0;
     assert_eq!((report.cameras.len(), report.cameras[0].1), (1, camera));
     assert!((world.get::<GlobalTransform>(camera).unwrap().0.matrix3.z_axis - DVec3::Z).length() < 1e-12);
-    let render = report.render;
+    let render = &report.render;
     assert_eq!(
         (render.integrator, render.spp, render.resolution),
         (Some(SidecarIntegrator::Direct), Some(16), Some([320, 200]))
     );
     assert_eq!((render.filter, render.seed), (Some(SidecarFilter::Nearest), None));
-    assert!(!report.decisions.join("\n").contains("no light"), "{:?}", report.decisions);
+    assert!(!report.decisions().join("\n").contains("no light"), "{:?}", report.decisions());
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn a_settings_file_of_its_own_places_models() {
     // Beside a.obj such a file is not taken for its settings.
     let folder = Folder::new(&[("a.obj", FLOOR.as_bytes()), ("a.toml", toml.as_bytes())]);
     let (_, report) = folder.load("a.obj");
-    assert_says(&report.unwrap().decisions.join("\n"), "a scene of its own");
+    assert_says(&report.unwrap().decisions().join("\n"), "a scene of its own");
 }
 
 #[test]
@@ -197,8 +197,8 @@ fn models_that_are_missing_or_misplaced_are_named() {
 #[test]
 fn settings_may_be_named_by_the_caller() {
     let folder = Folder::new(&[("a.obj", FLOOR.as_bytes()), ("other.toml", b"[render]\nseed = 7\n")]);
-    let options = LoadOptions { scene_settings: Some(folder.0.join("other.toml")) };
+    let options = LoadOptions { scene_settings: Some(folder.0.join("other.toml")), ..LoadOptions::default() };
     assert_eq!(folder.load_with("a.obj", &options).1.unwrap().render.seed, Some(7));
-    let options = LoadOptions { scene_settings: Some(folder.0.join("gone.toml")) };
+    let options = LoadOptions { scene_settings: Some(folder.0.join("gone.toml")), ..LoadOptions::default() };
     assert_says(&folder.load_with("a.obj", &options).1.unwrap_err().to_string(), "gone.toml: no such file");
 }

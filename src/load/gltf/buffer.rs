@@ -1,6 +1,7 @@
 //! Buffers, buffer views, and the URIs they come from.
 
 use super::Document;
+use crate::load::budget::Budget;
 use crate::load::error::{LoadError, ReadError};
 use crate::load::source::{Bytes, Folder, SCENE_LIMIT};
 use gltf::json::{Index, Root, buffer::View};
@@ -12,15 +13,23 @@ pub(super) struct Buffer<'a> {
 }
 
 /// Gets all buffers.
-pub(super) fn read_all<'a>(root: &Root, folder: &Folder, binary: Option<&'a [u8]>) -> Vec<Buffer<'a>> {
+pub(super) fn read_all<'a>(
+    root: &Root,
+    folder: &Folder,
+    binary: Option<&'a [u8]>,
+    budget: &Budget,
+) -> Vec<Buffer<'a>> {
     let one = |(i, buffer): (usize, &gltf::json::Buffer)| {
         let data = match (&buffer.uri, binary) {
-            (Some(uri), _) => {
-                read_uri(folder, uri, SCENE_LIMIT).map_err(|why| format!("{}: {why}", shorten(uri)))
-            }
+            (Some(uri), _) => read_uri(folder, uri, SCENE_LIMIT.min(budget.left()))
+                .map_err(|why| format!("{}: {why}", shorten(uri))),
             (None, Some(binary)) if i == 0 => Ok(Cow::Borrowed(binary)),
             (None, _) => Err("neither a URI nor a binary chunk holds its data".to_owned()),
         };
+        if let Ok(Cow::Owned(bytes)) = &data {
+            // It is there already, and was checked before.
+            let _ = budget.take(bytes.len() as u64, "", "");
+        }
         let wanted = buffer.byte_length.0;
         let checked = data.and_then(|data| {
             if data.len() as u64 >= wanted {
@@ -65,27 +74,36 @@ impl<'a> Document<'a> {
     /// The bytes of a buffer view and its stride.
     pub(super) fn view(&self, index: &Index<View>, user: &str) -> Result<(&[u8], Option<usize>), LoadError> {
         let view = self.at(&self.root.buffer_views, index, "buffer view", user)?;
-        let place = || format!("buffer view {}", index.value());
-        self.at(&self.root.buffers, &view.buffer, "buffer", &place())?;
-        let buffer = &self.buffers[view.buffer.value()];
-        let data = buffer
-            .data
-            .as_ref()
-            .map_err(|why| self.broken(format!("buffer {}", view.buffer.value()), why))?;
+        let stride = view.byte_stride.map(|stride| stride.0);
+        if let Some(Some(decoded)) = self.unpacked.get(index.value()) {
+            return Ok((decoded, stride));
+        }
         let offset = view.byte_offset.map_or(0, |offset| offset.0);
-        let range = offset.checked_add(view.byte_length.0).and_then(|end| {
+        let place = format!("buffer view {}", index.value());
+        Ok((self.bytes(&Index::new(view.buffer.value() as u32), offset, view.byte_length.0, &place)?, stride))
+    }
+
+    /// Bytes of a buffer.
+    pub(super) fn bytes(
+        &self,
+        index: &Index<gltf::json::Buffer>,
+        offset: u64,
+        length: u64,
+        place: &str,
+    ) -> Result<&[u8], LoadError> {
+        self.at(&self.root.buffers, index, "buffer", place)?;
+        let buffer = &self.buffers[index.value()];
+        let data =
+            buffer.data.as_ref().map_err(|why| self.broken(format!("buffer {}", index.value()), why))?;
+        let range = offset.checked_add(length).and_then(|end| {
             let (start, end) = (usize::try_from(offset).ok()?, usize::try_from(end).ok()?);
             data.get(start..end)
         });
-        let bytes = range.ok_or_else(|| {
-            let length = view.byte_length.0;
+        range.ok_or_else(|| {
             let size = data.len();
-            self.broken(
-                place(),
-                format!("out of bounds: offset {offset} + length {length} in a buffer of {size} bytes"),
-            )
-        })?;
-        Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+            let what = format!("offset {offset} + length {length} in a buffer of {size} bytes");
+            self.broken(place, format!("out of bounds: {what}"))
+        })
     }
 }
 

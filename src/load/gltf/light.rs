@@ -30,20 +30,18 @@ pub(super) fn light_of(
     let file = document.file;
     let place = format!("light {}", named.light.value());
     let Checked::Valid(kind) = light.type_ else {
-        sink.warn(format!("{file}: {place}: unknown type of light, ignored"));
+        sink.ignored(file, &place, "unknown type of light");
         return Ok(None);
     };
     let power = Vec3::from(light.color) * light.intensity / LUMEN_PER_WATT;
     if !power.is_finite() || power.min_element() < 0.0 {
-        sink.warn(format!("{file}: {place}: colour or intensity negative or not finite, ignored"));
+        sink.ignored(file, &place, "light with a colour or intensity that is negative or not finite");
         return Ok(None);
     }
     if light.range.is_some() {
-        sink.warn(format!("{file}: the range of lights is ignored: they reach as far as light does"));
+        sink.approximated(file, &place, "range of a light ignored: it reaches as far as light does");
     }
-    sink.decide(format!(
-        "{file}: punctual lights are in candela and lux as the format says: 683 make one W/sr or W/m²"
-    ));
+    sink.decide(file, "punctual lights are in candela and lux as the format says: 683 make one W/sr or W/m²");
     Ok(Some(match kind {
         LightType::Point => Light::Point { intensity: power },
         LightType::Directional => Light::Directional { irradiance: power, angle: 0.0 },
@@ -52,9 +50,8 @@ pub(super) fn light_of(
                 light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| (s.inner_cone_angle, s.outer_cone_angle));
             let legal = inner >= 0.0 && inner < outer && outer <= FRAC_PI_2;
             if !legal {
-                sink.warn(format!(
-                    "{file}: {place}: spot cone angles out of order ({inner}, {outer}), mended"
-                ));
+                let what = format!("spot cone angles out of order ({inner}, {outer}), mended");
+                sink.repaired(file, &place, what);
             }
             let outer_angle = if outer.is_finite() { outer.clamp(1e-3, FRAC_PI_2) } else { FRAC_PI_4 };
             let inner_angle = if inner.is_finite() { inner.clamp(0.0, outer_angle * 0.999) } else { 0.0 };
@@ -77,7 +74,7 @@ pub(super) fn camera_of(
     let name = node.name.clone().or_else(|| camera.name.clone());
     let name = name.unwrap_or_else(|| format!("camera {}", index.value()));
     let mut mend = |what: &str| {
-        sink.warn(format!("{}: camera {}: {what}", document.file, index.value()));
+        sink.repaired(document.file, &format!("camera {}", index.value()), what);
     };
     let projection = match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(CameraType::Perspective), Some(perspective), _) => {

@@ -3,7 +3,7 @@
 use super::Document;
 use super::texture::{Textures, uses};
 use crate::load::error::LoadError;
-use crate::load::report::Sink;
+use crate::load::report::{Kind, Sink};
 use crate::load::settings::Materials;
 use crate::scene::{Alpha, Encoding, Glass, Glossy, Material};
 use bevy_ecs::name::Name;
@@ -32,7 +32,7 @@ impl Palette {
     /// The material for primitives without one, spawned when it is first needed.
     pub(super) fn default_material(&mut self, file: &str, sink: &mut Sink<'_>) -> Entity {
         *self.default.get_or_insert_with(|| {
-            sink.decide(format!("{file}: surfaces without a material are light grey"));
+            sink.decide(file, "surfaces without a material are light grey");
             sink.spawn((Name::new("default"), Material::default()))
         })
     }
@@ -64,10 +64,8 @@ pub(super) fn spawn_all(
     }
     let with_normal_map = document.root.materials.iter().filter(|m| m.normal_texture.is_some()).count();
     if with_normal_map > 0 {
-        sink.warn(format!(
-            "{}: normal maps are not supported and ignored ({with_normal_map} materials)",
-            document.file
-        ));
+        let what = "normal maps are not supported and ignored".to_owned();
+        sink.remark(Kind::Ignored, document.file, "", what, with_normal_map);
     }
     Ok(palette)
 }
@@ -78,9 +76,8 @@ fn uv_set(document: &Document<'_>, material: &json::Material, name: &str, sink: 
     let set = uses.first().map_or(0, |first| first.uv_set);
     if uses.iter().any(|other| other.uv_set != set) {
         let file = document.file;
-        sink.warn(format!(
-            "{file}: material `{name}`: its textures use several TEXCOORD sets; all get TEXCOORD_{set}"
-        ));
+        let what = format!("textures use several TEXCOORD sets; all get TEXCOORD_{set}");
+        sink.approximated(file, &format!("material `{name}`"), what);
     }
     set
 }
@@ -119,10 +116,8 @@ fn convert(
         (opacity, metallic, roughness) =
             (a, f32::from(u8::from(is_metal)), 1.0 - unit(old.glossiness_factor.0));
         (base_texture, rough_texture) = (old.diffuse_texture.as_ref(), None);
-        sink.warn(format!(
-            "{}: KHR_materials_pbrSpecularGlossiness is approximated by metal and roughness",
-            document.file
-        ));
+        let what = "KHR_materials_pbrSpecularGlossiness by metal and roughness";
+        sink.approximated(document.file, &format!("material `{name}`"), what);
     }
     let strength = extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength.0);
     let emission = Vec3::from(material.emissive_factor.0) * strength;
@@ -131,15 +126,13 @@ fn convert(
     let is_glass = transmission > GLASS_TRANSMISSION && roughness < GLASS_ROUGHNESS && metallic < 0.5;
     if transmission > 0.0 {
         let becomes = if is_glass { "clear glass" } else { "opaque" };
-        sink.decide(format!(
-            "{}: material `{name}` transmits {transmission} at roughness {roughness}: shown as {becomes}",
-            document.file
-        ));
+        let what = format!("transmission of {transmission} at roughness {roughness} shown as {becomes}");
+        sink.approximated(document.file, &format!("material `{name}`"), what);
     }
     let ior = extensions.ior.as_ref().map_or(1.5, |ior| ior.ior.0);
     let glass = Glass { ior: if ior.is_finite() && ior >= 1.0 { ior } else { 1.5 }, tint: base_color };
     if clamped.get() || !emission_is_legal {
-        sink.warn(format!("{}: material `{name}`: factor out of range, clamped", document.file));
+        sink.repaired(document.file, &format!("material `{name}`"), "factor out of range, clamped");
     }
     let unlit = extensions.unlit.is_some();
     Material {

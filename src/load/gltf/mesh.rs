@@ -1,16 +1,17 @@
 //! glTF meshes: all primitives of a mesh in one [`TriangleMesh`].
 
+use super::Document;
 use super::accessor::Elements;
+use super::deform::{self, Follower};
 use super::material::Palette;
-use super::vertices::{Morphs, Used};
-use super::{Document, skin};
+use super::vertices::Used;
 use crate::load::error::LoadError;
 use crate::load::geometry::{self, Part};
 use crate::load::report::Sink;
-use crate::scene::Mesh;
+use crate::scene::{Deform, Mesh, Skin};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use glam::{DAffine3, Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
@@ -30,7 +31,7 @@ pub(super) struct Built {
     pub(super) triangles: usize,
 }
 
-/// Meshes of a file, built when first used; a skinned one once for each skin.
+/// Meshes of a file, built when first used; one that changes shape once for each node.
 #[derive(Default)]
 pub(super) struct Meshes {
     built: HashMap<(usize, Option<usize>), Built>,
@@ -38,17 +39,17 @@ pub(super) struct Meshes {
 }
 
 impl Meshes {
-    /// The mesh entity of `index`, posed by `joints` if it is skinned.
+    /// The mesh entity of `index`.
     pub(super) fn get(
         &mut self,
         document: &Document<'_>,
         index: &Index<json::Mesh>,
-        skin: Option<(usize, &[DAffine3])>,
+        follower: Option<Follower>,
         palette: &mut Palette,
         user: &str,
         sink: &mut Sink<'_>,
     ) -> Result<Built, LoadError> {
-        let key = (index.value(), skin.map(|(skin, _)| skin));
+        let key = (index.value(), follower.as_ref().map(|follower| follower.node));
         if let Some(built) = self.built.get(&key) {
             return Ok(built.clone());
         }
@@ -58,19 +59,14 @@ impl Meshes {
         let mut materials: Vec<Entity> = Vec::new();
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("{label}, primitive {i}");
-            let material = match &primitive.material {
-                Some(material) => *document.at(
-                    &palette.materials,
-                    &Index::new(material.value() as u32),
-                    "material",
-                    &place,
-                )?,
+            let worn = document.material_of(primitive);
+            let material = match worn {
+                Some(index) => *document.at(&palette.materials, &Index::new(index), "material", &place)?,
                 None => palette.default_material(document.file, sink),
             };
-            let uv_set = primitive.material.as_ref().map_or(0, |m| palette.uv_sets[m.value()]);
-            let joints = skin.map(|(_, joints)| joints);
+            let uv_set = worn.map_or(0, |index| palette.uv_sets[index as usize]);
             let Some(mut part) =
-                read_primitive(document, primitive, uv_set, &mesh.weights, joints, &place, sink)?
+                read_primitive(document, primitive, uv_set, follower.as_ref(), &place, sink)?
             else {
                 continue;
             };
@@ -88,13 +84,20 @@ impl Meshes {
                 u16::try_from(slot).map_err(|_| document.broken(&place, "more than 65536 materials"))?;
             parts.push(part);
         }
-        let done = geometry::finish(geometry::merge(parts));
-        for line in done.mended.lines() {
-            sink.warn(format!("{}: {label}: {line}", document.file));
-        }
+        let parts = geometry::faceted_beside_smooth(parts);
+        let bound = follower.map(|follower| (follower, deform::gather(&parts)));
+        // What has no area now may have it in another shape.
+        let done = geometry::finish(geometry::merge(parts), bound.is_some());
+        done.mended.tell(document.file, &label, sink);
         let name = mesh.name.clone().unwrap_or(label);
-        let entity = (!done.mesh.triangles.is_empty())
-            .then(|| sink.spawn((Name::new(name), Mesh(Arc::new(done.mesh)))));
+        let mesh = Arc::new(done.mesh);
+        let entity =
+            (!mesh.triangles.is_empty()).then(|| sink.spawn((Name::new(name), Mesh(Arc::clone(&mesh)))));
+        if let (Some(entity), Some((follower, (influences, targets)))) = (entity, bound) {
+            let skin = follower.skin.map(|skin| Skin { influences, ..skin });
+            let deform = Deform { rest: mesh, targets, weights: Some(follower.weights), skin };
+            sink.world.entity_mut(entity).insert(deform);
+        }
         let built = Built { entity, materials, triangles: done.triangles };
         self.built.insert(key, built.clone());
         Ok(built)
@@ -106,8 +109,7 @@ fn read_primitive(
     document: &Document<'_>,
     primitive: &Primitive,
     uv_set: u32,
-    weights: &Option<Vec<f32>>,
-    joints: Option<&[DAffine3]>,
+    follower: Option<&Follower>,
     place: &str,
     sink: &mut Sink<'_>,
 ) -> Result<Option<Part>, LoadError> {
@@ -116,10 +118,8 @@ fn read_primitive(
         return Err(document.broken(place, "unknown mode (what the vertices form)"));
     };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-        sink.warn(format!(
-            "{file}: {place}: mode {} (points or lines) has no triangles, skipped",
-            mode.as_gl_enum()
-        ));
+        let what = format!("mode {} (points or lines) has no triangles", mode.as_gl_enum());
+        sink.ignored(file, place, what);
         return Ok(None);
     }
     let attribute = |semantic: Semantic, width: &[usize]| -> Result<Option<Elements<'_>>, LoadError> {
@@ -141,38 +141,42 @@ fn read_primitive(
     let normals = attribute(Semantic::Normals, &[3])?;
     let mut uvs = attribute(Semantic::TexCoords(uv_set), &[2])?;
     if uvs.is_none() && uv_set != 0 {
-        sink.warn(format!("{file}: {place}: no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
+        sink.repaired(file, place, format!("no TEXCOORD_{uv_set}, TEXCOORD_0 instead"));
         uvs = attribute(Semantic::TexCoords(0), &[2])?;
     }
     let colors = attribute(Semantic::Colors(0), &[3, 4])?;
-    let skinning = match joints {
-        Some(matrices) => attribute(Semantic::Joints(0), &[4])?
-            .zip(attribute(Semantic::Weights(0), &[4])?)
-            .map(|(j, w)| (matrices, j, w)),
-        None => None,
-    };
-    let bound = skinning.as_ref().map(|(_, joints, weights)| [joints, weights]);
     let attributes = [normals.as_ref(), uvs.as_ref(), colors.as_ref()];
-    for other in attributes.into_iter().flatten().chain(bound.into_iter().flatten()) {
+    for other in attributes.into_iter().flatten() {
         if other.count != positions.count {
             let problem = format!("attribute has a count of {}, POSITION {}", other.count, positions.count);
             return Err(document.broken(&other.place, problem));
         }
     }
+    let corners = match &primitive.indices {
+        Some(index) => document.elements(index, place)?.count,
+        None => positions.count,
+    };
+    let vertices = positions.count.min(corners) as u64;
+    let triangles = if mode == Mode::Triangles { corners / 3 } else { corners } as u64;
+    // Twice, because primitives are put together; then what building a hierarchy takes.
+    let memory = 4 * positions.count as u64 + 2 * (vertices * 48 + triangles * 14) + triangles * 80;
+    document.budget.take(memory, file, place)?;
     let used = Used::read(document, primitive, positions.count, mode, place, sink)?;
-    let morphs = Morphs::open(document, primitive, weights, positions.count, place)?;
     let vertices = used.vertices.iter().map(|&v| v as usize);
     let mut part = Part {
-        positions: vertices.clone().map(|v| Vec3::from(morphs.apply(0, v, positions.get_f32(v)))).collect(),
-        normals: normals
-            .map(|n| vertices.clone().map(|v| Vec3::from(morphs.apply(1, v, n.get_f32(v)))).collect()),
+        positions: vertices.clone().map(|v| Vec3::from(positions.get_f32(v))).collect(),
+        normals: normals.map(|n| vertices.clone().map(|v| Vec3::from(n.get_f32(v))).collect()),
         uvs: uvs.map(|uvs| vertices.clone().map(|v| Vec2::from(uvs.get_f32(v))).collect()),
         colors: colors.map(|c| vertices.clone().map(|v| color(&c, v)).collect()),
         triangles: used.triangles,
-        slot: 0,
+        ..Part::default()
     };
-    if let Some((matrices, joints, weights)) = &skinning {
-        skin::pose(&mut part, &used.vertices, matrices, joints, weights);
+    if let Some(follower) = follower {
+        let (used, count) = (&used.vertices, positions.count);
+        part.targets = deform::targets(document, primitive, used, count, place)?;
+        if follower.skin.is_some() {
+            part.influences = deform::influences(document, primitive, used, count, place)?;
+        }
     }
     Ok(Some(part))
 }

@@ -10,28 +10,41 @@
 //! targets at the default weights; 1 candela is 1/683 W/sr and 1 lux 1/683 W/m².
 
 mod accessor;
+mod animation;
 mod buffer;
 mod container;
+mod deform;
+mod draco;
 mod light;
 mod material;
 mod mesh;
+mod meshopt;
 mod node;
-mod skin;
 mod texture;
 mod vertices;
 
+use super::budget::Budget;
 use super::error::LoadError;
-use super::report::Sink;
+use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder, without_bom};
+use animation::AnimationJson;
 use bevy_ecs::prelude::*;
+use gltf::json::mesh::Primitive;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Extensions that are honoured wholly or closely enough to accept a file that requires them.
-const SUPPORTED: [&str; 15] = [
+const SUPPORTED: &[&str] = &[
+    "EXT_mesh_features",
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_structural_metadata",
     "EXT_texture_webp",
+    "FB_ngon_encoding",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -42,6 +55,9 @@ const SUPPORTED: [&str; 15] = [
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
     "MSFT_lod",
@@ -56,15 +72,34 @@ pub(super) fn load(
     overrides: &mut Materials,
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
+    sink.begin(Phase::Parsing);
     let container = container::split(file, &bytes)?;
     let json = without_bom(container.json);
     check_head(file, json, sink)?;
-    let tree: Root = parse(file, json)?;
-    let placements: Placements = parse(file, json)?;
-    let buffers = buffer::read_all(&tree, folder, container.binary);
-    let document = Document { file, folder, root: tree, placements: placements.nodes, buffers };
+    let tree = parse_tree(file, json)?;
+    let more: More = parse(file, json)?;
+    sink.begin(Phase::Reading);
+    let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
+    let mut document = Document {
+        file,
+        folder,
+        root: tree,
+        placements: more.nodes,
+        animations: more.animations,
+        variant: None,
+        unpacked: Vec::new(),
+        decoded: HashMap::new(),
+        budget: Arc::clone(&sink.budget),
+        buffers,
+    };
+    document.choose_variant(sink)?;
     document.check_references()?;
+    sink.begin(Phase::Decompressing);
+    document.unpacked = meshopt::decode_all(&document)?;
+    document.decoded = draco::decode_all(&document)?;
+    sink.begin(Phase::Images);
     let materials = material::spawn_all(&document, overrides, sink)?;
+    sink.begin(Phase::Meshes);
     node::spawn_scene(&document, root, materials, sink)
 }
 
@@ -74,7 +109,15 @@ struct Document<'a> {
     folder: &'a Folder,
     root: Root,
     placements: Vec<Placement>,
+    animations: Vec<AnimationJson>,
+    /// Which of `KHR_materials_variants` is worn.
+    variant: Option<u32>,
     buffers: Vec<buffer::Buffer<'a>>,
+    /// Buffer views that were compressed, by index.
+    unpacked: Vec<Option<Vec<u8>>>,
+    /// Accessors of primitives that were compressed, by index.
+    decoded: HashMap<usize, draco::Decoded>,
+    budget: Arc<Budget>,
 }
 
 impl Document<'_> {
@@ -97,6 +140,51 @@ impl Document<'_> {
         Ok(())
     }
 
+    /// Takes the material variant that the user wants.
+    fn choose_variant(&mut self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+        let extension = self.root.extensions.as_ref().and_then(|e| e.khr_materials_variants.as_ref());
+        let variants = extension.map_or(&[][..], |extension| &extension.variants).iter().zip(0_u32..);
+        let names: Vec<(String, u32)> = variants.map(|(variant, i)| (variant.name.clone(), i)).collect();
+        self.variant = match &sink.options.variant {
+            Some(wanted) => Some(self.chosen(wanted, "variant", &names)?),
+            None => None,
+        };
+        if !names.is_empty() {
+            let all: Vec<&str> = names.iter().map(|(name, _)| name.as_str()).collect();
+            let worn = self.variant.map_or("its default materials", |i| all[i as usize]);
+            sink.decide(self.file, format!("wears {worn} (--variant: {})", all.join(", ")));
+        }
+        Ok(())
+    }
+
+    /// The material of a primitive in the variant that is worn.
+    fn material_of(&self, primitive: &Primitive) -> Option<u32> {
+        let mappings = primitive.extensions.as_ref().and_then(|e| e.khr_materials_variants.as_ref());
+        let mapped = self.variant.zip(mappings).and_then(|(variant, extension)| {
+            extension.mappings.iter().find(|mapping| mapping.variants.contains(&variant))
+        });
+        mapped
+            .map(|mapping| mapping.material)
+            .or_else(|| primitive.material.as_ref().map(|index| index.value() as u32))
+    }
+
+    /// What the user chose by name or number.
+    fn chosen<T: Copy>(
+        &self,
+        wanted: &str,
+        kind: &'static str,
+        list: &[(String, T)],
+    ) -> Result<T, LoadError> {
+        let by_name = list.iter().find(|(name, _)| name == wanted);
+        let by_number = || list.get(wanted.parse::<usize>().ok()?);
+        by_name.or_else(by_number).map(|&(_, value)| value).ok_or_else(|| {
+            let names: Vec<String> =
+                list.iter().enumerate().map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            LoadError::NotThere { file: self.file.to_owned(), kind, wanted: wanted.to_owned(), names }
+        })
+    }
+
     /// The object that `index` names, or an error that says who names it.
     fn at<'l, T>(&self, list: &'l [T], index: &Index<T>, kind: &str, user: &str) -> Result<&'l T, LoadError> {
         list.get(index.value()).ok_or_else(|| {
@@ -105,11 +193,14 @@ impl Document<'_> {
     }
 }
 
-/// Where nodes stand, in double precision: `gltf::json` keeps only single.
+/// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
+/// and animations.
 #[derive(Deserialize)]
-struct Placements {
+struct More {
     #[serde(default)]
     nodes: Vec<Placement>,
+    #[serde(default)]
+    animations: Vec<AnimationJson>,
 }
 
 /// Placement of one node; see the glTF specification, section 3.5.3.
@@ -148,6 +239,17 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
     })
 }
 
+/// The whole tree; once more without animations if it fails, because `gltf::json` knows only those of nodes.
+fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
+    let first = match parse(file, json) {
+        Ok(tree) => return Ok(tree),
+        Err(first) => first,
+    };
+    let mut value: serde_json::Value = parse(file, json)?;
+    let animations = value.as_object_mut().and_then(|root| root.remove("animations"));
+    animations.and_then(|_| serde_json::from_value(value).ok()).ok_or(first)
+}
+
 /// Refuses other versions and required extensions; warns of extensions that are merely used.
 fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadError> {
     if json.iter().all(u8::is_ascii_whitespace) {
@@ -178,18 +280,16 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
     let ignored: Vec<&str> =
         head.extensions_used.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect();
     if !ignored.is_empty() {
-        sink.warn(format!("{file}: extensions not supported and ignored: {}", ignored.join(", ")));
+        for name in ignored {
+            sink.ignored(file, "", format!("extension {name} is not supported"));
+        }
     }
     Ok(())
 }
 
 fn way_out(extension: &str) -> &'static str {
     match extension {
-        "KHR_draco_mesh_compression" => "export it again without Draco compression",
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "export it again without meshopt compression (gltfpack without -c)"
-        }
-        "KHR_texture_basisu" => "export it again with PNG or JPEG textures",
+        "EXT_texture_avif" | "MSFT_texture_dds" => "export it again with PNG, JPEG or WebP textures",
         _ => "export it again without that extension",
     }
 }

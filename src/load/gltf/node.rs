@@ -1,11 +1,12 @@
 //! The node hierarchy: checked, then spawned from the roots down without recursion.
 
+use super::deform::{self, Follower};
 use super::material::Palette;
 use super::mesh::{Built, Meshes};
-use super::{Document, Placement, light, skin};
+use super::{Document, Placement, animation, light};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
-use crate::scene::{Instance, Transform};
+use crate::scene::{Instance, MorphWeights, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
@@ -29,16 +30,11 @@ pub(super) fn spawn_scene(
     let roots = scene_roots(document, &parents, sink)?;
     let local: Vec<DAffine3> =
         (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
-    let order = top_down(document, &roots);
-    let mut world: Vec<Option<DAffine3>> = vec![None; nodes.len()];
-    for &i in &order {
-        let above = parents[i].and_then(|parent| world[parent]).unwrap_or(DAffine3::IDENTITY);
-        world[i] = Some(above * local[i]);
-    }
+    let order = visible(document, &roots, &parents, sink);
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
-        sink.decide(format!("{}: no node in it; shows each mesh once", document.file));
+        sink.decide(document.file, "no node in it; shows each mesh once");
         for i in 0..document.root.meshes.len() {
             let built = meshes.get(document, &Index::new(i as u32), None, &mut palette, "file", sink)?;
             let entity = sink.spawn((Name::new(format!("mesh {i}")), Transform::default(), ChildOf(root)));
@@ -59,24 +55,33 @@ pub(super) fn spawn_scene(
             sink.world.entity_mut(entity).insert(camera);
             sink.report.cameras.push((name, entity));
         }
-        if let Some(mesh) = &node.mesh {
-            let joints = match &node.skin {
-                Some(index) => Some((index.value(), skin::joints(document, index, &world, &user)?)),
-                None => None,
-            };
-            let posed = joints.as_ref().map(|(skin, joints)| (*skin, joints.as_slice()));
-            let built = meshes.get(document, mesh, posed, &mut palette, &user, sink)?;
-            if posed.is_some() {
-                // The format: the transform of a skinned mesh's own node does not count.
-                let name = Name::new(format!("{user} (skinned)"));
-                let holder = sink.spawn((name, Transform::default(), ChildOf(root)));
-                instantiate(&built, holder, sink);
-            } else {
-                place(document, node, entity, &built, &user, sink)?;
-            }
+    }
+    for &i in &order {
+        let (node, user) = (&nodes[i], format!("node {i}"));
+        let (Some(index), Some(entity)) = (&node.mesh, entities[i]) else { continue };
+        let mesh = document.at(&document.root.meshes, index, "mesh", &user)?;
+        let weights = deform::weights_of(node, mesh);
+        let morphs = weights.iter().any(|&weight| weight != 0.0)
+            || (!weights.is_empty() && !document.animations.is_empty());
+        // The format: the transform of a skinned mesh's own node does not count.
+        let holder = node.skin.as_ref().map(|_| {
+            sink.spawn((Name::new(format!("{user} (skinned)")), Transform::default(), ChildOf(root)))
+        });
+        let skin = match node.skin.as_ref().zip(holder) {
+            Some((index, holder)) => Some(deform::skin(document, index, &entities, holder, &user, sink)?),
+            None => None,
+        };
+        let follower = (morphs || skin.is_some()).then_some(Follower { node: i, weights: entity, skin });
+        if morphs {
+            sink.world.entity_mut(entity).insert(MorphWeights(weights));
+        }
+        let built = meshes.get(document, index, follower, &mut palette, &user, sink)?;
+        match holder {
+            Some(holder) => instantiate(&built, holder, sink),
+            None => place(document, node, entity, &built, &user, sink)?,
         }
     }
-    Ok(())
+    animation::spawn_all(document, &entities, sink)
 }
 
 /// Puts the mesh on its node, or once at each place that `EXT_mesh_gpu_instancing` lists.
@@ -164,7 +169,7 @@ fn placement(document: &Document<'_>, i: usize, sink: &mut Sink<'_>) -> Result<D
         } else {
             "rotation is not a unit quaternion: normalised"
         };
-        sink.warn(format!("{}: node {i}: {what}", document.file));
+        sink.repaired(document.file, &format!("node {i}"), what);
     }
     Ok(affine)
 }
@@ -211,17 +216,26 @@ fn scene_roots(
 ) -> Result<Vec<usize>, LoadError> {
     let root = &document.root;
     let file = document.file;
-    let scene = match &root.scene {
-        Some(index) => Some(document.at(&root.scenes, index, "scene", "default scene")?),
-        None => root.scenes.first(),
+    let names = root.scenes.iter().enumerate();
+    let names: Vec<(String, usize)> =
+        names.map(|(i, scene)| (scene.name.clone().unwrap_or_else(|| format!("scene {i}")), i)).collect();
+    let shown = match (&sink.options.scene, &root.scene) {
+        (Some(wanted), _) => document.chosen(wanted, "scene", &names)?,
+        (None, Some(index)) => {
+            document.at(&root.scenes, index, "scene", "default scene")?;
+            index.value()
+        }
+        (None, None) => 0,
     };
-    if root.scenes.len() > 1 {
-        let shown = root.scene.as_ref().map_or(0, Index::value);
-        sink.decide(format!("{file}: has {} scenes; shows scene {shown}", root.scenes.len()));
+    let scene = root.scenes.get(shown);
+    if names.len() > 1 {
+        let all: Vec<&str> = names.iter().map(|(name, _)| name.as_str()).collect();
+        let what = format!("shows scene {shown} of {} (--gltf-scene: {})", names.len(), all.join(", "));
+        sink.decide(file, what);
     }
     let Some(scene) = scene else {
         if !parents.is_empty() {
-            sink.decide(format!("{file}: no scene in it; shows all nodes"));
+            sink.decide(file, "no scene in it; shows all nodes");
         }
         return Ok((0..parents.len()).filter(|&i| parents[i].is_none()).collect());
     };
@@ -239,12 +253,38 @@ fn scene_roots(
     let mut roots = Vec::new();
     for node in scene.nodes.iter().map(Index::value) {
         if shown_above[node] || !std::mem::take(&mut listed[node]) {
-            sink.warn(format!("{file}: scene: node {node} is listed although it is shown already"));
+            sink.repaired(file, &format!("node {node}"), "listed in the scene although it is shown already");
         } else {
             roots.push(node);
         }
     }
     Ok(roots)
+}
+
+/// Of the nodes below the roots those that show (`KHR_node_visibility`), in the same order.
+fn visible(
+    document: &Document<'_>,
+    roots: &[usize],
+    parents: &[Option<usize>],
+    sink: &mut Sink<'_>,
+) -> Vec<usize> {
+    let is_hidden = |i: usize| {
+        let others = document.root.nodes[i].extensions.as_ref().map(|extensions| &extensions.others);
+        let extension = others.and_then(|others| others.get("KHR_node_visibility"));
+        extension.and_then(|e| e.get("visible")).is_some_and(|visible| visible == false)
+    };
+    let mut order = top_down(document, roots);
+    let mut hidden = vec![false; document.root.nodes.len()];
+    for &i in &order {
+        hidden[i] = is_hidden(i) || parents[i].is_some_and(|parent| hidden[parent]);
+    }
+    let all = order.len();
+    order.retain(|&i| !hidden[i]);
+    if order.len() < all {
+        let what = format!("leaves out {} nodes that are not visible", all - order.len());
+        sink.decide(document.file, what);
+    }
+    order
 }
 
 /// All nodes below the roots, parents before children, in file order.

@@ -56,11 +56,8 @@ impl<'a> Textures<'a> {
                 let user = format!("material {i}");
                 let texture = document.at(&root.textures, used.index, "texture", &user)?;
                 let Some(source) = source_of(texture) else {
-                    sink.warn(format!(
-                        "{}: texture {} has no image source: white",
-                        document.file,
-                        used.index.value()
-                    ));
+                    let place = format!("texture {}", used.index.value());
+                    sink.repaired(document.file, &place, "texture has no image source: white");
                     continue;
                 };
                 let user = format!("texture {}", used.index.value());
@@ -90,7 +87,7 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// The image of a texture: the core one, else that of an extension.
+/// The image of a texture: that of an extension (the core one is for those who cannot read it), else the core one.
 fn source_of(texture: &json::Texture) -> Option<usize> {
     let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
     let extension = |name: &str| {
@@ -98,7 +95,7 @@ fn source_of(texture: &json::Texture) -> Option<usize> {
         u32::try_from(source).ok().map(|source| source as usize)
     };
     let core = Some(texture.source.value()).filter(|&source| source != u32::MAX as usize);
-    core.or_else(|| extension("EXT_texture_webp")).or_else(|| extension("KHR_texture_basisu"))
+    extension("EXT_texture_webp").or(core).or_else(|| extension("KHR_texture_basisu"))
 }
 
 fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image) -> Picture<'d> {
@@ -129,11 +126,8 @@ fn sampling(
     let Some(Sampler { wrap_s, wrap_t, mag_filter, min_filter, .. }) =
         document.root.samplers.get(sampler.value())
     else {
-        sink.warn(format!(
-            "{}: texture {index} names sampler {}, which does not exist",
-            document.file,
-            sampler.value()
-        ));
+        let what = format!("names sampler {}, which does not exist", sampler.value());
+        sink.repaired(document.file, &format!("texture {index}"), what);
         return Default::default();
     };
     let mut unknown = false;
@@ -158,7 +152,8 @@ fn sampling(
         _ => Filter::Bilinear,
     };
     if unknown {
-        sink.warn(format!("{}: sampler {}: unknown wrap or filter mode", document.file, sampler.value()));
+        let place = format!("sampler {}", sampler.value());
+        sink.repaired(document.file, &place, "unknown wrap or filter mode, the default instead");
     }
     (wrap, filter)
 }

@@ -1,55 +1,11 @@
-//! Which vertices the triangles of a primitive use, and where morph targets move them.
+//! Which vertices the triangles of a primitive use.
 
 use super::Document;
-use super::accessor::Elements;
 use super::mesh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use gltf::json::mesh::{Mode, Primitive};
-use gltf::json::{self, Index};
 use std::collections::HashMap;
-/// Morph targets at the default weights of the mesh.
-pub(super) struct Morphs<'a> {
-    targets: Vec<(f32, [Option<Elements<'a>>; 2])>,
-}
-
-impl<'a> Morphs<'a> {
-    pub(super) fn open(
-        document: &'a Document<'_>,
-        primitive: &Primitive,
-        weights: &Option<Vec<f32>>,
-        count: usize,
-        place: &str,
-    ) -> Result<Self, LoadError> {
-        let mut targets = Vec::new();
-        for (i, target) in primitive.targets.iter().flatten().enumerate() {
-            let weight = weights.as_ref().and_then(|weights| weights.get(i)).copied().unwrap_or(0.0);
-            if weight == 0.0 {
-                continue;
-            }
-            let open = |index: &Option<Index<json::Accessor>>| match index {
-                Some(index) => document.elements(index, &format!("{place}, morph target {i}")).map(Some),
-                None => Ok(None),
-            };
-            let pair = [open(&target.positions)?, open(&target.normals)?];
-            if pair.iter().flatten().any(|elements| elements.count != count) {
-                return Err(document.broken(place, format!("morph target {i} has another count of vertices")));
-            }
-            targets.push((weight, pair));
-        }
-        Ok(Self { targets })
-    }
-
-    pub(super) fn apply(&self, attribute: usize, vertex: usize, mut value: [f32; 3]) -> [f32; 3] {
-        for (weight, pair) in &self.targets {
-            if let Some(elements) = &pair[attribute] {
-                let delta = elements.get_f32::<3>(vertex);
-                value = std::array::from_fn(|c| value[c] + weight * delta[c]);
-            }
-        }
-        value
-    }
-}
 
 /// The vertices that triangles use, renumbered: several primitives often share one large array.
 pub(super) struct Used {
@@ -124,10 +80,8 @@ impl Numbers {
 
 fn leftover(document: &Document<'_>, mode: Mode, count: usize, place: &str, sink: &mut Sink<'_>) {
     if mode == Mode::Triangles && !count.is_multiple_of(3) {
-        sink.warn(format!(
-            "{}: {place}: {count} indices are not a multiple of 3; the rest is left out",
-            document.file
-        ));
+        let what = "number of indices is not a multiple of 3; the rest is left out";
+        sink.repaired(document.file, place, what);
     }
 }
 

@@ -4,7 +4,8 @@ use super::super::error::LoadError;
 use super::super::source::without_bom;
 use std::borrow::Cow;
 
-/// The text of a file, without byte order mark. Bytes that are not UTF-8 become replacement characters.
+/// The text of a file, without byte order mark. What is not UTF-8 is taken for Latin-1,
+/// as older exporters write it.
 pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, LoadError> {
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
         return Err(LoadError::broken(file, "encoding", "UTF-16 text; save it as UTF-8"));
@@ -12,7 +13,11 @@ pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, L
     if bytes.contains(&0) {
         return Err(LoadError::broken(file, "content", "binary data, not text in UTF-8"));
     }
-    Ok(String::from_utf8_lossy(without_bom(bytes)))
+    let bytes = without_bom(bytes);
+    Ok(match str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()),
+    })
 }
 
 /// One statement.

@@ -21,7 +21,7 @@ mod raw;
 
 use super::error::LoadError;
 use super::geometry;
-use super::report::Sink;
+use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
 use crate::scene::{Instance, Material, Mesh};
@@ -40,13 +40,17 @@ pub(super) fn load(
     overrides: &mut Materials,
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
+    sink.begin(Phase::Parsing);
     let text = lines::text_of(file, &bytes)?;
     let mut raw = Raw::default();
     lines::for_each(&text, |statement| raw.read(file, &statement))?;
     drop(text);
     drop(bytes);
+    sink.budget.take(raw.memory(), file, "its lists and faces")?;
+    raw.scale_colors(file, sink);
     raw.check(file, sink)?;
     raw.warn(file, sink);
+    sink.begin(Phase::Images);
     let library = match overrides.all {
         Some(_) => BTreeMap::new(),
         None => mtl::spawn_all(file, folder, &raw.libraries, overrides, sink),
@@ -56,10 +60,9 @@ pub(super) fn load(
         .iter()
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
-    let done = geometry::finish(assemble::mesh(&raw));
-    for line in done.mended.lines() {
-        sink.warn(format!("{file}: {line}"));
-    }
+    sink.begin(Phase::Meshes);
+    let done = geometry::finish(assemble::mesh(&raw), false);
+    done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
@@ -80,7 +83,7 @@ fn material_entity(
         return all;
     }
     let Some(name) = name else {
-        sink.decide(format!("{file}: surfaces without a material are light grey"));
+        sink.decide(file, "surfaces without a material are light grey");
         return sink.spawn((Name::new("default"), Material::default()));
     };
     if let Some(&known) = library.get(name) {
@@ -92,9 +95,9 @@ fn material_entity(
     let short: String = name.chars().take(80).collect();
     let lower = name.to_lowercase();
     if let Some((other, &entity)) = library.iter().find(|(other, _)| other.to_lowercase() == lower) {
-        sink.warn(format!("{file}: material `{short}` is defined as `{other}`"));
+        sink.repaired(file, "", format!("material `{short}` is defined as `{other}`"));
         return entity;
     }
-    sink.warn(format!("{file}: material `{short}` is not defined; light grey"));
+    sink.repaired(file, "", format!("material `{short}` is not defined; light grey"));
     sink.spawn((Name::new(short), Material::default()))
 }

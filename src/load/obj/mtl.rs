@@ -31,6 +31,8 @@ pub(super) fn spawn_all(
     let mut entities = BTreeMap::new();
     for material in &parsed {
         if entities.contains_key(&material.name) {
+            let what = format!("material `{}` is defined twice; the first counts", material.name);
+            sink.repaired(file, "", what);
             continue;
         }
         let entity = overrides.replacement(&material.name).unwrap_or_else(|| {
@@ -52,7 +54,8 @@ fn open(file: &str, folder: &Folder, library: &str, sink: &mut Sink<'_>) -> Vec<
         match folder.read_or_neighbour(name, TEXT_LIMIT) {
             Ok(bytes) => found.push((name.to_owned(), bytes)),
             Err(why) => {
-                sink.warn(format!("{file}: material library `{name}`: {why}; its materials are light grey"));
+                let what = format!("material library `{name}`: {why}; its materials are light grey");
+                sink.repaired(file, "", what);
             }
         }
     }
@@ -63,27 +66,27 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
     let text = match lines::text_of(library, bytes) {
         Ok(text) => text,
         Err(why) => {
-            sink.warn(format!("{file}: material library {why}"));
+            sink.ignored(file, "", format!("material library {why}"));
             return Vec::new();
         }
     };
-    let tidied = tidy(file, library, &text, sink);
+    let tidied = tidy(library, &text, sink);
     match tobj::load_mtl_buf(&mut tidied.as_bytes()) {
         Ok((materials, _)) => materials,
         Err(why) => {
-            sink.warn(format!("{file}: material library `{library}` cannot be read: {why}"));
+            sink.ignored(file, "", format!("material library `{library}` cannot be read: {why}"));
             Vec::new()
         }
     }
 }
 
 /// Only statements that `tobj` parses, in its spelling; warns of the others.
-fn tidy(file: &str, library: &str, text: &str, sink: &mut Sink<'_>) -> String {
+fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
     let mut tidied = String::with_capacity(text.len());
     let mut inside = false;
     let done: Result<(), std::fmt::Error> = lines::for_each(text, |Statement { line, keyword, rest }| {
         let mut ignore = |what: &str| {
-            sink.warn(format!("{file}: material library `{library}`, line {line}: `{keyword}` {what}"));
+            sink.ignored(library, &format!("line {line}"), format!("`{keyword}` {what}"));
             Ok(())
         };
         if keyword == "newmtl" {
@@ -117,16 +120,19 @@ fn tidy(file: &str, library: &str, text: &str, sink: &mut Sink<'_>) -> String {
             ("map_Kd" | "map_d" | "map_Ke", _) if rest.is_empty() => ignore("without a file name, ignored"),
             ("map_Kd" | "map_d" | "map_Ke", _) => writeln!(tidied, "{keyword} {rest}"),
             (
-                "map_Ka" | "map_Ks" | "map_Ns" | "map_Bump" | "map_bump" | "bump" | "disp" | "decal" | "refl"
-                | "norm",
+                "map_Ks" | "map_Ns" | "map_Bump" | "map_bump" | "bump" | "disp" | "decal" | "refl" | "norm",
                 _,
             ) => {
-                sink.warn(format!(
-                    "{file}: material library `{library}`: `{keyword}` textures are not supported, ignored"
-                ));
+                sink.ignored(
+                    library,
+                    &format!("line {line}"),
+                    format!("`{keyword}` textures are not supported"),
+                );
                 Ok(())
             }
-            _ => Ok(()),
+            // The ambient colour of a lighting model without other light.
+            ("map_Ka", _) => Ok(()),
+            _ => ignore("is not supported"),
         }
     });
     // Writing to a String cannot fail.
@@ -177,7 +183,7 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     };
     let ior = material.optical_density.filter(|&ior| ior > 1.0).unwrap_or(1.5);
     if out_of_range {
-        sink.warn(format!("{file}: material `{name}`: a value is out of range, clamped"));
+        sink.repaired(file, &format!("material `{name}`"), "a value is out of range, clamped");
     }
     let model = material.illumination_model.unwrap_or(2);
     let is_glass = matches!(model, 4 | 6 | 7 | 9);
@@ -185,9 +191,8 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let uses_specular = pbr.is_none() && !is_glass && (is_mirror || (model >= 2 && specular != Vec3::ZERO));
     let most = (diffuse + specular).max_element();
     if uses_specular && most > 1.0 {
-        sink.warn(format!(
-            "{file}: material `{name}`: Kd + Ks is {most} and would create light; both scaled down"
-        ));
+        let what = "Kd + Ks is above 1 and would create light; both scaled down";
+        sink.repaired(file, &format!("material `{name}`"), what);
         diffuse /= most;
         specular /= most;
     }

@@ -2,12 +2,15 @@
 
 use super::lines::Statement;
 use crate::load::error::LoadError;
-use crate::load::report::Sink;
+use crate::load::report::{Kind, Sink};
 use glam::{Vec2, Vec3};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 
 /// Stands for "no index given".
 pub(super) const NONE: u32 = u32::MAX;
+/// Different statements that are left out and named.
+const MOST_SKIPPED: usize = 24;
+
 /// One corner of a face: indices of position, texture coordinates and normal, or [`NONE`].
 #[derive(Clone, Copy)]
 pub(super) struct Corner {
@@ -24,6 +27,17 @@ pub(super) struct Face {
     pub(super) material: u16,
     /// Smoothing group; 0 is off.
     pub(super) group: u32,
+}
+
+/// What of a file is not in the picture.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Skipped {
+    ShortFaces,
+    Points,
+    Lines,
+    FreeForm,
+    Attributes,
+    Unknown(String),
 }
 
 /// An OBJ file as it is written.
@@ -45,9 +59,8 @@ pub(super) struct Raw {
     material: Option<String>,
     slot: Option<u16>,
     pub(super) group: u32,
-    short_faces: usize,
-    first_short_face: u32,
-    unknown: BTreeSet<String>,
+    /// What was left out, how often, and the line of the first.
+    skipped: BTreeMap<Skipped, (usize, u32)>,
 }
 
 impl Raw {
@@ -75,12 +88,14 @@ impl Raw {
             }
             "mtllib" => self.libraries.push(statement.rest.to_owned()),
             "s" => self.group = statement.rest.parse().unwrap_or(0),
-            "g" | "o" | "vp" | "p" | "l" => {}
-            other => {
-                if self.unknown.len() < 8 {
-                    self.unknown.insert(other.chars().take(20).collect());
-                }
-            }
+            "g" | "o" => {}
+            "p" => self.skip(Skipped::Points, statement.line),
+            "l" => self.skip(Skipped::Lines, statement.line),
+            "vp" | "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim"
+            | "hole" | "scrv" | "sp" | "end" | "con" => self.skip(Skipped::FreeForm, statement.line),
+            "bevel" | "c_interp" | "d_interp" | "lod" | "mg" | "shadow_obj" | "trace_obj" | "ctech"
+            | "stech" | "usemap" | "maplib" => self.skip(Skipped::Attributes, statement.line),
+            other => self.skip(Skipped::Unknown(shorten(other)), statement.line),
         }
         Ok(())
     }
@@ -117,9 +132,7 @@ impl Raw {
         }
         if self.corners.len() - first < 3 {
             self.corners.truncate(first);
-            self.first_short_face =
-                if self.short_faces == 0 { statement.line } else { self.first_short_face };
-            self.short_faces += 1;
+            self.skip(Skipped::ShortFaces, statement.line);
             return Ok(());
         }
         let first_corner = u32::try_from(first).map_err(|_| "more than 2^32 face corners".to_owned())?;
@@ -146,6 +159,23 @@ impl Raw {
         Ok(slot)
     }
 
+    /// Some exporters write colours as bytes.
+    pub(super) fn scale_colors(&mut self, file: &str, sink: &mut Sink<'_>) {
+        let most = self.colors.iter().filter(|c| c.is_finite()).map(|c| c.max_element()).fold(0.0, f32::max);
+        if most > 2.0 && most <= 255.0 {
+            self.colors.iter_mut().for_each(|color| *color /= 255.0);
+            sink.decide(file, "vertex colours go beyond 1: read as 0 to 255");
+        }
+    }
+
+    /// Bytes that this and the mesh made of it take, with what building a hierarchy over it does.
+    pub(super) fn memory(&self) -> u64 {
+        let lists = 12 * self.positions.len() + 12 * self.colors.len() + 8 * self.uvs.len();
+        let triangles = self.corners.len() - 2 * self.faces.len();
+        let here = lists + 12 * self.normals.len() + 12 * self.corners.len() + 16 * self.faces.len();
+        (here + 60 * self.corners.len() + (14 + 80) * triangles) as u64
+    }
+
     /// Corners of face `i`.
     pub(super) fn corners_of(&self, i: usize) -> &[Corner] {
         let start = self.faces[i].first_corner as usize;
@@ -168,9 +198,8 @@ impl Raw {
             }
         }
         if forgotten > 0 {
-            sink.warn(format!(
-                "{file}: {forgotten} indices of normals or texture coordinates ignored: the file has none"
-            ));
+            let what = "indices of normals or texture coordinates ignored: the file has none";
+            sink.remark(Kind::Repaired, file, "", what.to_owned(), forgotten);
         }
     }
 
@@ -203,16 +232,27 @@ impl Raw {
     }
 
     pub(super) fn warn(&self, file: &str, sink: &mut Sink<'_>) {
-        if self.short_faces > 0 {
-            let (count, line) = (self.short_faces, self.first_short_face);
-            sink.warn(format!("{file}: line {line}: {count} faces with fewer than three corners skipped"));
-        }
-        if !self.unknown.is_empty() {
-            let names: Vec<&str> = self.unknown.iter().map(String::as_str).collect();
-            sink.warn(format!("{file}: statements skipped: {}", names.join(", ")));
+        for (skipped, &(count, line)) in &self.skipped {
+            let what = match skipped {
+                Skipped::ShortFaces => "faces with fewer than three corners".to_owned(),
+                Skipped::Points => "points (`p`) have no surface".to_owned(),
+                Skipped::Lines => "lines (`l`) have no surface".to_owned(),
+                Skipped::FreeForm => {
+                    "statements of free-form curves and surfaces are not supported".to_owned()
+                }
+                Skipped::Attributes => "statements of display attributes are not supported".to_owned(),
+                Skipped::Unknown(keyword) => format!("unknown statement `{keyword}`"),
+            };
+            sink.remark(Kind::Ignored, file, &format!("line {line}"), what, count);
         }
         if self.faces.is_empty() {
-            sink.warn(format!("{file}: no faces in it: nothing to see"));
+            sink.ignored(file, "", "no faces in it: nothing to see");
+        }
+    }
+
+    fn skip(&mut self, what: Skipped, line: u32) {
+        if self.skipped.len() < MOST_SKIPPED || self.skipped.contains_key(&what) {
+            self.skipped.entry(what).or_insert((0, line)).0 += 1;
         }
     }
 }

@@ -251,10 +251,11 @@ fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -
     match change(sink.world, edit) {
         Ok(Changed::Nothing) if path.is_empty() => {}
         Ok(Changed::Nothing) => {
-            sink.warn(format!(
-                "{}: [[edit]] of \"{path}\": there is no such thing in the scene",
-                settings.file
-            ));
+            sink.ignored(
+                &settings.file,
+                &format!("[[edit]] of \"{path}\""),
+                "there is no such thing in the scene",
+            );
         }
         Ok(Changed::Old) => {}
         Ok(Changed::New(copy)) => sink.note_spawned(copy),

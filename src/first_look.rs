@@ -1,0 +1,75 @@
+//! What a small picture of a fresh scene says about it: too dark, too bright, or lit by hardly anything.
+
+use crate::app::App;
+use crate::image::Display;
+use crate::image::develop::suggest_exposure;
+use crate::load::{ADDED_LIGHT, Kind, LoadReport, light_for};
+use crate::scene::Light;
+use crate::scene::color::luminance;
+use crate::sync;
+use crate::trace::Film;
+use glam::{UVec2, Vec2, Vec3};
+
+/// Size of that picture: always the same, so that the window and `render` agree.
+const PROBE: UVec2 = UVec2::new(96, 64);
+const PROBE_SAMPLES: u32 = 4;
+/// A surface is dark below this share of what the bright ones show ...
+const DARK: f32 = 0.01;
+/// ... and a scene if this share of its surfaces is.
+const MOSTLY: f32 = 0.7;
+
+/// Lights the scene if nothing but its emissive surfaces shines and these hardly reach any other, and chooses
+/// the exposure if nobody has. Each decision goes into the report.
+pub(crate) fn settle(app: &mut App, report: &mut LoadReport, file: &str, choose_exposure: bool) {
+    let mut picture = app.probe(PROBE, PROBE_SAMPLES);
+    if app.world.query::<&Light>().iter(&app.world).next().is_none() && is_mostly_dark(app, &picture) {
+        light_for(&mut app.world);
+        app.build();
+        picture = app.probe(PROBE, PROBE_SAMPLES);
+        report.add(
+            Kind::Decided,
+            file,
+            format!("its emissive surfaces light hardly anything; {ADDED_LIGHT}"),
+        );
+    }
+    if !choose_exposure {
+        return;
+    }
+    match suggest_exposure(&picture) {
+        Some(0.0) => {}
+        Some(stops) => {
+            app.world.resource_mut::<Display>().exposure = stops;
+            let what = format!("the picture would be far off: exposed by {stops:+.2} EV");
+            report.add(Kind::Decided, file, what);
+        }
+        None => report.add(Kind::Decided, file, "no light reaches the camera: the picture is black"),
+    }
+}
+
+/// Whether most of the surfaces that the camera sees, and that do not shine themselves, are black beside the
+/// bright ones.
+fn is_mostly_dark(app: &App, picture: &Film) -> bool {
+    let scene = sync::traceable(&app.world);
+    let size = picture.size();
+    let mut seen: Vec<(f32, bool)> = Vec::new();
+    for y in 0..size.y {
+        for (x, pixel) in (0..size.x).zip(picture.row(y)) {
+            let ray = scene.viewpoint.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size);
+            if let Some(hit) = scene.geometry.tlas.closest_hit(&ray) {
+                let shines = scene.surface_at(&hit).1.material.emission != Vec3::ZERO;
+                seen.push((luminance(pixel.mean().as_vec3()), shines));
+            }
+        }
+    }
+    let mut lit: Vec<f32> = seen.iter().map(|&(l, _)| l).filter(|&l| l > 0.0).collect();
+    if lit.is_empty() {
+        return !seen.is_empty();
+    }
+    // Not the very brightest: a lamp in the picture outshines all that it lights.
+    let rank = (lit.len() - 1) * 9 / 10;
+    let least = DARK * *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
+    // Where the texture of an emissive surface is black it is a surface like others.
+    let others = seen.iter().filter(|&&(l, shines)| !shines || l <= least);
+    let dark = others.clone().filter(|&&(l, _)| l <= least).count();
+    dark > 0 && dark as f32 > MOSTLY * others.count() as f32
+}

@@ -1,0 +1,175 @@
+//! Animations → [`Animation`] entities. One that is damaged is left out; it never costs the scene.
+
+use super::Document;
+use crate::load::error::LoadError;
+use crate::load::report::Sink;
+use crate::scene::{
+    Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, Transform,
+};
+use bevy_ecs::name::Name;
+use bevy_ecs::prelude::*;
+use gltf::json::Index;
+use serde::Deserialize;
+use std::collections::HashSet;
+
+/// As it stands in the file; `gltf::json` refuses channels without a node, which extensions make.
+#[derive(Deserialize)]
+pub(super) struct AnimationJson {
+    name: Option<String>,
+    #[serde(default)]
+    channels: Vec<ChannelJson>,
+    #[serde(default)]
+    samplers: Vec<SamplerJson>,
+}
+
+#[derive(Deserialize)]
+struct ChannelJson {
+    sampler: usize,
+    target: TargetJson,
+}
+
+#[derive(Deserialize)]
+struct TargetJson {
+    node: Option<usize>,
+    path: String,
+}
+
+#[derive(Deserialize)]
+struct SamplerJson {
+    input: u32,
+    output: u32,
+    interpolation: Option<String>,
+}
+
+/// Spawns all animations, and plays what is asked for.
+pub(super) fn spawn_all(
+    document: &Document<'_>,
+    entities: &[Option<Entity>],
+    sink: &mut Sink<'_>,
+) -> Result<(), LoadError> {
+    let mut spawned = Vec::new();
+    let mut moved: HashSet<(Entity, Property)> = HashSet::new();
+    let mut together = Vec::new();
+    for (i, json) in document.animations.iter().enumerate() {
+        let animation = convert(document, i, json, entities, sink);
+        let name = json.name.clone().unwrap_or_else(|| format!("animation {i}"));
+        let entity = sink.spawn((Name::new(name.clone()), animation.clone()));
+        spawned.push((name, entity));
+        // Animations of different things play side by side; of the same thing, the first one does.
+        let targets: Vec<_> = animation.channels.iter().map(|c| (c.target, c.property)).collect();
+        if targets.iter().all(|target| !moved.contains(target)) {
+            moved.extend(targets);
+            together.push(entity);
+        }
+    }
+    if let Some(time) = sink.options.time {
+        let animations = match &sink.options.animation {
+            Some(wanted) => vec![document.chosen(wanted, "animation", &spawned)?],
+            None => together,
+        };
+        let names: Vec<&str> = spawned
+            .iter()
+            .filter(|(_, entity)| animations.contains(entity))
+            .map(|(name, _)| name.as_str())
+            .collect();
+        let which = if names.is_empty() { "no animation".to_owned() } else { names.join(", ") };
+        sink.decide(document.file, format!("stands as at {time} s of {which}"));
+        sink.world.insert_resource(Playing { animations, time });
+    } else if !spawned.is_empty() {
+        sink.decide(document.file, "has animations; stands in its rest pose (--time S shows another)");
+    }
+    sink.report.animations.extend(spawned);
+    Ok(())
+}
+
+fn convert(
+    document: &Document<'_>,
+    index: usize,
+    json: &AnimationJson,
+    entities: &[Option<Entity>],
+    sink: &mut Sink<'_>,
+) -> Animation {
+    let mut animation = Animation::default();
+    let place = format!("animation {index}");
+    for channel in &json.channels {
+        let property = match channel.target.path.as_str() {
+            "translation" => Property::Translation,
+            "rotation" => Property::Rotation,
+            "scale" => Property::Scale,
+            "weights" => Property::Weights,
+            _ => {
+                let what = format!("channels that move `{}` are not supported", channel.target.path);
+                sink.ignored(document.file, &place, what);
+                continue;
+            }
+        };
+        // A node that is not in the scene shown moves nothing there.
+        let Some(target) = channel.target.node.and_then(|node| entities.get(node).copied().flatten()) else {
+            continue;
+        };
+        let Some(sampler) = json.samplers.get(channel.sampler) else {
+            sink.ignored(document.file, &place, "channel whose sampler does not exist");
+            continue;
+        };
+        let curve = match curve(document, sampler, property, &place) {
+            Ok(curve) => curve,
+            Err(why) => {
+                sink.ignored(document.file, &place, format!("damaged channel: {why}"));
+                continue;
+            }
+        };
+        if property == Property::Weights && sink.world.get::<MorphWeights>(target).is_none() {
+            continue;
+        }
+        if property != Property::Weights && sink.world.get::<Pose>(target).is_none() {
+            let local = sink.world.get::<Transform>(target).copied().unwrap_or_default();
+            let (scale, rotation, translation) = local.0.to_scale_rotation_translation();
+            sink.world.entity_mut(target).insert(Pose { translation, rotation, scale });
+        }
+        animation.duration = animation.duration.max(curve.times.last().copied().unwrap_or(0.0).into());
+        animation.channels.push(Channel { target, property, curve });
+    }
+    animation
+}
+
+fn curve(
+    document: &Document<'_>,
+    sampler: &SamplerJson,
+    property: Property,
+    place: &str,
+) -> Result<Curve, String> {
+    let open = |index| document.elements(&Index::new(index), place).map_err(|error| error.to_string());
+    let (input, output) = (open(sampler.input)?, open(sampler.output)?);
+    let interpolation = match sampler.interpolation.as_deref() {
+        None | Some("LINEAR") => Interpolation::Linear,
+        Some("STEP") => Interpolation::Step,
+        Some("CUBICSPLINE") => Interpolation::Cubic,
+        Some(other) => return Err(format!("unknown interpolation `{other}`")),
+    };
+    let parts = if interpolation == Interpolation::Cubic { 3 } else { 1 };
+    let keys = input.count;
+    let width = match property {
+        Property::Translation | Property::Scale => 3,
+        Property::Rotation => 4,
+        Property::Weights => output.count.checked_div(keys * parts).unwrap_or(0),
+    };
+    let element = if property == Property::Weights { 1 } else { width };
+    let values = keys * parts * if property == Property::Weights { width } else { 1 };
+    if input.width != 1 || keys == 0 || width == 0 || output.width != element || output.count != values {
+        return Err("keyframes and values do not match".to_owned());
+    }
+    let times: Vec<f32> = (0..keys).map(|i| input.get_f32::<1>(i)[0]).collect();
+    if !times.iter().all(|time| time.is_finite()) || times.windows(2).any(|pair| pair[0] > pair[1]) {
+        return Err("times of keyframes do not ascend".to_owned());
+    }
+    let values: Vec<f32> = if element == 1 {
+        (0..output.count).map(|i| output.get_f32::<1>(i)[0]).collect()
+    } else {
+        (0..output.count).flat_map(|i| output.get_f32::<4>(i).into_iter().take(element)).collect()
+    };
+    if values.iter().all(|value| value.is_finite()) {
+        Ok(Curve { times, values, width, interpolation })
+    } else {
+        Err("a value is not finite".to_owned())
+    }
+}

@@ -1,0 +1,60 @@
+//! What is decided by a small picture of the scene: light and exposure.
+
+use penumbra::image::Display;
+use penumbra::load::{LoadOptions, LoadReport, SceneSource};
+use penumbra::open::{Opened, Wishes, open};
+use penumbra::scene::Light;
+use std::path::Path;
+
+fn opened(name: &str, obj: &str, mtl: &str) -> Opened {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("first_look");
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join(format!("{name}.mtl")), mtl).unwrap();
+    let path = folder.join(format!("{name}.obj"));
+    std::fs::write(&path, format!("mtllib {name}.mtl\n{obj}")).unwrap();
+    open(&SceneSource::File(path), &LoadOptions::default(), &Wishes::default()).unwrap()
+}
+
+fn lights(opened: &mut Opened) -> usize {
+    opened.app.world.query::<&Light>().iter(&opened.app.world).count()
+}
+
+fn says(report: &LoadReport, words: &str) -> bool {
+    report.decisions().iter().any(|line| line.contains(words))
+}
+
+/// A floor, seen from above, and a square of material `lamp` of half its size at the height `y`, facing down.
+fn floor_and_lamp(y: f32) -> String {
+    format!(
+        "v -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\nusemtl floor\nf 1 2 3 4\n\
+         v -.5 {y} 1\nv .5 {y} 1\nv .5 {y} 0\nv -.5 {y} 0\nusemtl lamp\nf 8 7 6 5\n"
+    )
+}
+
+const MTL: &str = "newmtl floor\nKd .5 .5 .5\nnewmtl lamp\nKd 0 0 0\nKe 5 5 5\n";
+
+#[test]
+fn a_lamp_that_lights_the_floor_is_the_light() {
+    let mut scene = opened("lamp", &floor_and_lamp(1.0), MTL);
+    assert_eq!(lights(&mut scene), 0);
+    assert!(!says(&scene.report, "light hardly anything"), "{:?}", scene.report.decisions());
+}
+
+#[test]
+fn a_glow_that_reaches_nothing_gets_light_beside_it() {
+    // Below the floor.
+    let mut scene = opened("glow", &floor_and_lamp(-0.2), MTL);
+    assert_eq!(lights(&mut scene), 2);
+    assert!(says(&scene.report, "light hardly anything"), "{:?}", scene.report.decisions());
+}
+
+#[test]
+fn a_picture_far_off_is_exposed_and_a_good_one_is_not() {
+    let bright = MTL.replace("Ke 5 5 5", "Ke 5000 5000 5000");
+    let scene = opened("bright", &floor_and_lamp(1.0), &bright);
+    let stops = scene.app.world.resource::<Display>().exposure;
+    assert!((-14.0..-6.0).contains(&stops), "{stops}");
+    assert!(says(&scene.report, "exposed by -"));
+    let scene = opened("good", &floor_and_lamp(1.0), MTL);
+    assert_eq!(scene.app.world.resource::<Display>().exposure, 0.0, "{:?}", scene.report.decisions());
+}

@@ -1,0 +1,190 @@
+//! What moves: animations, skins and morph targets at a chosen time; scenes and variants by choice.
+
+use super::builder::{Builder, TRIANGLE};
+use super::*;
+use penumbra::app::App;
+use penumbra::scene::Playing;
+use penumbra::trace::RenderSettings;
+
+fn with(text: &str, options: &LoadOptions) -> (World, LoadReport) {
+    let (world, report) = Folder::new(&[("a.gltf", text.as_bytes())]).load_with("a.gltf", options);
+    (world, report.unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn at(time: f64) -> LoadOptions {
+    LoadOptions { time: Some(time), ..LoadOptions::default() }
+}
+
+/// Two triangles; one moves, and both of two more animations turn or move them.
+fn moving() -> String {
+    let mut file = Builder::default();
+    let positions = file.floats("VEC3", &TRIANGLE);
+    let times = file.floats("SCALAR", &[0.0, 2.0]);
+    let moves = file.floats("VEC3", &[0., 0., 0., 4., 0., 0.]);
+    let back = file.floats("VEC3", &[0., 0., 0., -4., 0., 0.]);
+    let turns = file.floats("VEC4", &[0., 0., 0., 1., 0., 1., 0., 0.]);
+    let sampler = |output| format!(r#""samplers":[{{"input":{times},"output":{output}}}]"#);
+    let channel =
+        |node, path| format!(r#""channels":[{{"sampler":0,"target":{{"node":{node},"path":"{path}"}}}}]"#);
+    file.finish(&format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":{positions}}}}}]}}],
+        "nodes":[{{"name":"one","mesh":0,"translation":[0,7,0],"scale":[2,2,2]}},{{"name":"two","mesh":0}}],"scenes":[{{"nodes":[0,1]}}],
+        "animations":[{{"name":"go",{},{}}},{{"name":"back",{},{}}},{{"name":"turn",{},{}}}]"#,
+        sampler(moves),
+        channel(0, "translation"),
+        sampler(back),
+        channel(0, "translation"),
+        sampler(turns),
+        channel(1, "rotation"),
+    ))
+}
+
+fn place(world: &mut World, name: &str) -> DAffine3 {
+    named::<GlobalTransform>(world, name).0
+}
+
+#[test]
+fn without_a_time_everything_rests_and_the_report_says_so() {
+    let (mut world, report) = with(&moving(), &LoadOptions::default());
+    assert_eq!(place(&mut world, "one").translation, DVec3::Y * 7.0);
+    assert_says(&report.decisions().join("\n"), "rest pose (--time");
+    let names: Vec<&str> = report.animations.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["go", "back", "turn"]);
+}
+
+#[test]
+fn at_a_time_the_first_animation_and_those_of_other_things_play() {
+    let (mut world, report) = with(&moving(), &at(0.5));
+    let a = place(&mut world, "one");
+    assert_eq!(a.translation, DVec3::X);
+    assert!((a.matrix3.x_axis - DVec3::X * 2.0).length() < 1e-12, "its scale stays");
+    // An eighth of a half turn about y... a quarter of π.
+    let b = place(&mut world, "two").transform_vector3(DVec3::X);
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!((b - DVec3::new(half, 0.0, -half)).length() < 1e-6, "{b}");
+    assert_says(&report.decisions().join("\n"), "0.5 s of go, turn");
+    // Over and over: 2.5 s is 0.5 s of the second round.
+    assert_eq!(place(&mut with(&moving(), &at(2.5)).0, "one"), a);
+}
+
+#[test]
+fn an_animation_is_chosen_by_name_or_number() {
+    for wanted in ["back", "1"] {
+        let options = LoadOptions { animation: Some(wanted.to_owned()), ..at(1.0) };
+        let (mut world, _) = with(&moving(), &options);
+        assert_eq!(place(&mut world, "one").translation, DVec3::X * -2.0);
+        assert_eq!(place(&mut world, "two"), DAffine3::IDENTITY);
+    }
+    let options = LoadOptions { animation: Some("jump".to_owned()), ..at(1.0) };
+    let (_, refused) = Folder::new(&[("a.gltf", moving().as_bytes())]).load_with("a.gltf", &options);
+    assert_says(
+        &refused.unwrap_err().to_string(),
+        "a.gltf: no animation \"jump\"; it has 0 \"go\", 1 \"back\"",
+    );
+}
+
+#[test]
+fn a_frame_follows_the_clock() {
+    let mut app = App::new(RenderSettings::default());
+    let folder = Folder::new(&[("a.gltf", moving().as_bytes())]);
+    let source = SceneSource::File(folder.0.join("a.gltf"));
+    load(&mut app.world, &source, &at(0.0)).unwrap();
+    app.build();
+    app.world.resource_mut::<Playing>().time = 1.0;
+    app.build();
+    assert_eq!(place(&mut app.world, "one").translation, DVec3::X * 2.0);
+}
+
+/// A triangle whose second corner hangs on a joint that rises, and whose third is moved by a morph target.
+fn bending(joints: &str, node: &str, second_set: bool) -> String {
+    let mut file = Builder::default();
+    let positions = file.floats("VEC3", &TRIANGLE);
+    let target = file.floats("VEC3", &[0., 0., 0., 0., 0., 0., 0., 0., 3.]);
+    let carried = [[0, 9, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0]];
+    let all = [[255, 0, 0, 0]; 3];
+    let (indices, weights) = (file.bytes4(&carried, false), file.bytes4(&all, true));
+    let more = if second_set { r#","JOINTS_1":2,"WEIGHTS_1":3"# } else { "" };
+    let times = file.floats("SCALAR", &[0.0, 1.0]);
+    let rise = file.floats("VEC3", &[0., 0., 0., 0., 8., 0.]);
+    let grow = file.floats("SCALAR", &[0.0, 1.0]);
+    file.finish(&format!(
+        r#""meshes":[{{"weights":[0.25],"primitives":[{{"attributes":{{"POSITION":{positions},"JOINTS_0":{indices},"WEIGHTS_0":{weights}{more}}},"targets":[{{"POSITION":{target}}}]}}]}}],
+        "nodes":[{{"mesh":0{node}}},{{"name":"j0"}},{{"name":"j1","translation":[0,2,0]}}],"scenes":[{{"nodes":[0,1,2]}}]{joints},
+        "animations":[{{"samplers":[{{"input":{times},"output":{rise}}},{{"input":{times},"output":{grow}}}],
+          "channels":[{{"sampler":0,"target":{{"node":2,"path":"translation"}}}},{{"sampler":1,"target":{{"node":0,"path":"weights"}}}}]}}]"#
+    ))
+}
+
+const SKIN: &str = r#","skins":[{"joints":[1,2]}]"#;
+
+#[test]
+fn joints_and_morph_targets_shape_a_mesh_at_rest_and_at_a_time() {
+    let text = bending(SKIN, r#","skin":0,"translation":[100,0,0]"#, false);
+    let (mut world, _) = with(&text, &LoadOptions::default());
+    let expected = [Vec3::ZERO, Vec3::new(1., 2., 0.), Vec3::new(0., 1., 0.75)];
+    assert_eq!(only_mesh(&mut world).positions, expected);
+    let (mut world, _) = with(&text, &at(0.5));
+    let expected = [Vec3::ZERO, Vec3::new(1., 4., 0.), Vec3::new(0., 1., 1.5)];
+    assert_eq!(only_mesh(&mut world).positions, expected);
+    // A second set of the same four changes nothing.
+    let (mut world, _) = with(&bending(SKIN, r#","skin":0"#, true), &at(0.5));
+    assert_eq!(only_mesh(&mut world).positions, expected);
+}
+
+#[test]
+fn a_nodes_own_morph_weights_come_before_the_meshs() {
+    let (mut world, _) = with(&bending("", r#","weights":[0.5]"#, false), &LoadOptions::default());
+    assert_eq!(only_mesh(&mut world).positions[2], Vec3::new(0., 1., 1.5));
+}
+
+#[test]
+fn two_nodes_may_wear_one_mesh_in_two_shapes() {
+    let text = bending("", r#","weights":[0.5]"#, false)
+        .replace(r#"{"name":"j0"}"#, r#"{"name":"j0","mesh":0,"weights":[0]}"#);
+    let (mut world, report) = with(&text, &LoadOptions::default());
+    let mut heights: Vec<f32> = world.query::<&Mesh>().iter(&world).map(|m| m.0.positions[2].z).collect();
+    heights.sort_by(f32::total_cmp);
+    assert_eq!((heights, report.triangles), (vec![0.0, 1.5], 2));
+}
+
+#[test]
+fn a_damaged_animation_costs_only_itself() {
+    let text = moving().replace(r#""path":"translation""#, r#""path":"pointer""#);
+    let (mut world, report) = with(&text, &at(1.0));
+    assert_eq!(place(&mut world, "one").translation, DVec3::Y * 7.0);
+    assert_says(&report.warnings().join("\n"), "`pointer` are not supported: 2");
+    let text = moving().replacen(r#""target":{"node":0,"#, r#""target":{"#, 1);
+    assert_eq!(with(&text, &at(1.0)).1.animations.len(), 3);
+    let text = moving().replacen(r#""input":1"#, r#""input":77"#, 1);
+    assert_says(&with(&text, &at(1.0)).1.warnings().join("\n"), "damaged channel");
+}
+
+#[test]
+fn a_scene_is_chosen_by_name_or_number_and_the_choice_is_told() {
+    let text = gltf_triangle("", "", "")
+        .replace(r#""nodes":[{"mesh":0}],"#, r#""nodes":[{"mesh":0},{"mesh":0},{"mesh":0}],"#)
+        .replace(r#"[{"nodes":[0]}]"#, r#"[{"nodes":[0]},{"name":"two","nodes":[1,2]}]"#);
+    let (_, report) = with(&text, &LoadOptions::default());
+    assert_eq!(report.triangles, 1);
+    assert_says(&report.decisions().join("\n"), "scene 0 of 2 (--gltf-scene: scene 0, two)");
+    for wanted in ["two", "1"] {
+        let options = LoadOptions { scene: Some(wanted.to_owned()), ..LoadOptions::default() };
+        assert_eq!(with(&text, &options).1.triangles, 2);
+    }
+}
+
+#[test]
+fn a_variant_changes_materials() {
+    let primitive = r#","material":0,"extensions":{"KHR_materials_variants":{"mappings":[{"material":1,"variants":[1,2]}]}}"#;
+    let more = r#","materials":[{"name":"plain"},{"name":"gold"}],"extensions":{"KHR_materials_variants":{"variants":[{"name":"day"},{"name":"noon"},{"name":"night"}]}}"#;
+    let text = gltf_triangle("", primitive, more);
+    let worn = |variant: Option<&str>| {
+        let options = LoadOptions { variant: variant.map(str::to_owned), ..LoadOptions::default() };
+        let (mut world, report) = with(&text, &options);
+        let instance = world.query::<&Instance>().single(&world).unwrap().clone();
+        (world.get::<Name>(instance.materials[0]).unwrap().to_string(), report.decisions().join("\n"))
+    };
+    assert_eq!(worn(None).0, "plain");
+    assert_says(&worn(None).1, "its default materials (--variant: day, noon, night)");
+    assert_eq!([worn(Some("day")).0, worn(Some("night")).0, worn(Some("1")).0], ["plain", "gold", "gold"]);
+}
