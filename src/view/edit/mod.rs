@@ -330,7 +330,7 @@ mod tests {
     use std::path::PathBuf;
 
     fn opened(scene: &str, settings: Option<PathBuf>) -> App {
-        let options = LoadOptions { scene_settings: settings };
+        let options = LoadOptions { scene_settings: settings, ..LoadOptions::default() };
         let wishes = Wishes { size: Some(UVec2::new(64, 36)), samples: Some(2), ..Wishes::default() };
         open(&SceneSource::parse(scene).unwrap(), &options, &wishes).unwrap().app
     }
