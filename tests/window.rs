@@ -691,3 +691,42 @@ fn a_file_that_changes_is_loaded_again_with_the_camera_kept() {
     desktop.wait_until_done(&mut program);
     assert_eq!(difference(&grey, &desktop.shot(&program)), 0.0, "the camera is where it was");
 }
+
+#[test]
+fn a_recording_is_done_again_and_the_times_are_told() {
+    let Some(desktop) = desktop("replay") else {
+        return;
+    };
+    let file = desktop.directory.join("taps.txt");
+    let mut script = String::new();
+    for i in 0..40 {
+        let (key, at) = (["W", "ArrowLeft", "S", "ArrowRight"][i % 4], 0.5 + 0.2 * i as f64);
+        script += &format!("{at:.2} down {key}\n{:.2} up {key}\n", at + 0.05);
+    }
+    script += "9 quit\n";
+    std::fs::write(&file, script).unwrap();
+    let mut program = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
+    let program = program.args(["cornell", "--resolution", "960x540", "--replay"]).arg(&file);
+    let output = program.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout);
+    println!("{}", said.trim());
+    let told: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    assert_eq!(told["events"], 40, "each key press is answered by a picture of its own");
+    let number = |key: &str| told[key].as_f64().unwrap();
+    assert!(number("median_ms") > 0.0 && number("median_ms") <= number("p99_ms"), "{said}");
+    assert!(number("moving_pictures_per_second") > 1.0, "{said}");
+}
+
+#[test]
+fn completions_and_the_manual_page_know_the_flags() {
+    for arguments in [&["completions", "bash"][..], &["completions", "fish"], &["man"]] {
+        let output = Command::new(env!("CARGO_BIN_EXE_penumbra")).args(arguments).output().unwrap();
+        assert!(output.status.success());
+        let said = String::from_utf8_lossy(&output.stdout);
+        let plain = said.replace("\\-", "-");
+        for flag in ["resolution", "replay", "lens-radius"] {
+            assert!(plain.contains(flag), "{arguments:?} says nothing of {flag}");
+        }
+    }
+}
