@@ -17,6 +17,8 @@ const PROBE_SAMPLES: u32 = 4;
 const DARK: f32 = 0.01;
 /// ... and a scene if this share of its surfaces is.
 const MOSTLY: f32 = 0.7;
+/// Share of the seen surfaces that may be dark because their pixels are at an edge.
+const OUTLINE: f32 = 0.1;
 
 /// Lights the scene if nothing but its emissive surfaces shines and these hardly reach any other, and chooses
 /// the exposure if nobody has. Each decision goes into the report.
@@ -70,6 +72,7 @@ fn is_mostly_dark(app: &App, picture: &Film) -> bool {
     let least = DARK * *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
     // Where the texture of an emissive surface is black it is a surface like others.
     let others = seen.iter().filter(|&&(l, shines)| !shines || l <= least);
-    let dark = others.clone().filter(|&&(l, _)| l <= least).count();
-    dark > 0 && dark as f32 > MOSTLY * others.count() as f32
+    let dark = others.clone().filter(|&&(l, _)| l <= least).count() as f32;
+    // The outline of a glowing thing alone is no scene that wants light.
+    dark > OUTLINE * seen.len() as f32 && dark > MOSTLY * others.count() as f32
 }

@@ -58,3 +58,9 @@ fn a_picture_far_off_is_exposed_and_a_good_one_is_not() {
     let scene = opened("good", &floor_and_lamp(1.0), MTL);
     assert_eq!(scene.app.world.resource::<Display>().exposure, 0.0, "{:?}", scene.report.decisions());
 }
+
+#[test]
+fn a_glowing_thing_alone_stays_alone() {
+    let mut scene = opened("alone", "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl lamp\nf 1 2 3\n", MTL);
+    assert_eq!(lights(&mut scene), 0, "{:?}", scene.report.decisions());
+}
