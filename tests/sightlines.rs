@@ -8,7 +8,7 @@ use penumbra::trace::visible::{Blocker, irradiance, join};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// SplitMix64.
+/// The generator `SplitMix64`.
 struct Rng(u64);
 
 impl Rng {
@@ -66,7 +66,9 @@ impl Case {
     fn blockers(&self) -> Vec<Blocker> {
         let side = (self.point - self.quad.corner.as_dvec3()).dot(self.quad.normal.as_dvec3()).signum();
         let facing = self.quad.normal * side as f32;
-        let of = |t: &[DVec3; 3]| Blocker::new(&t.map(|p| p.as_vec3()), self.quad.corner, facing, 1e-6);
+        let of = |t: &[DVec3; 3]| {
+            Blocker::new(&[t[0].as_vec3(), t[1].as_vec3(), t[2].as_vec3()], self.quad.corner, facing, 1e-6)
+        };
         self.triangles.iter().filter_map(of).collect()
     }
 

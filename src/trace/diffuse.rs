@@ -110,8 +110,8 @@ fn arrive_from_quad(
     if shape.radiance.iter().all(|r| *r == shape.radiance[0]) {
         let radiance = shape.radiance[0];
         let which = in_the_way(scene, block, sightlines, quad, light);
-        for i in 0..block.count {
-            out.certain[i] = which[i] == Some(0);
+        for (certain, which) in out.certain.iter_mut().zip(&which[..block.count]) {
+            *certain = *which == Some(0);
         }
         if out.certain[..block.count].contains(&true) {
             isa.run(IntegrateQuad { block, quad, radiance, two_sided: shape.two_sided, out });
@@ -154,8 +154,8 @@ fn in_the_way(
             if !blockers.is_empty() {
                 scene.geometry.tlas.isa().run(Reach { block, quad, blockers, out: &mut out });
             }
-            for i in first..end {
-                which[i] = Some(out[i]);
+            for (which, out) in which[first..end].iter_mut().zip(&out[first..end]) {
+                *which = Some(*out);
             }
         }
         done = end;

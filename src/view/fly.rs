@@ -391,7 +391,7 @@ mod tests {
         let (mut world, mut schedule) = at_rest();
         let before = press(&mut world, &mut schedule, &[Tap::FrameAll, Tap::OpenLens, Tap::Remember(3)]);
         let lens = |world: &World| world.get::<Lens>(world.resource::<ActiveCamera>().0).copied();
-        let sharp = lens(&world).expect("an open lens");
+        let sharp = lens(&world).unwrap();
         let pivot = world.resource::<Navigation>().pivot;
         let away = [Tap::CloseLens, Tap::View(Side::Top), Tap::Orthographic];
         assert_ne!(press(&mut world, &mut schedule, &away), before);

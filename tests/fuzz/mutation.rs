@@ -85,7 +85,8 @@ pub fn apply(bytes: &[u8], mutations: &[Mutation]) -> Vec<u8> {
 fn glb_mended(bytes: Vec<u8>, change: impl FnOnce(Vec<u8>) -> Vec<u8>) -> Vec<u8> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes(b.try_into().unwrap()) as usize);
     let json_end = word(12).map(|length| 20 + length).filter(|&end| end <= bytes.len());
-    let Some(json_end) = json_end.filter(|_| bytes.starts_with(b"glTF") && bytes.len() % 2 == 0) else {
+    let Some(json_end) = json_end.filter(|_| bytes.starts_with(b"glTF") && bytes.len().is_multiple_of(2))
+    else {
         return change(bytes);
     };
     let rest = bytes[json_end..].to_vec();

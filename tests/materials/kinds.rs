@@ -26,8 +26,9 @@ impl Seen {
         let mut stage = Stage::new(settings(1, 1, Integrator::Path, 1));
         stage.trace(1);
         let layers = material.layers.as_ref().map(|layers| Box::new(layers.renamed(|_| None)));
-        let body = |layers: &&Box<Layers<_>>| layers.transmission.as_ref().is_some_and(|t| t.body.is_some());
-        let passed = layers.as_ref().filter(body).map(|layers| Arc::new(Passed::new(layers.ior)));
+        let has_body = |layers: &Layers<_>| layers.transmission.as_ref().is_some_and(|t| t.body.is_some());
+        let body = layers.as_deref().filter(|layers| has_body(layers));
+        let passed = body.map(|layers| Arc::new(Passed::new(layers.ior)));
         let material = Material { layers: None, ..material.clone() };
         let surface = Surface { layers, passed, ..Surface::from(material) };
         let at = Interaction {

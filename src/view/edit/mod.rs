@@ -353,7 +353,7 @@ mod tests {
     }
 
     fn status(app: &App) -> Arc<EditStatus> {
-        app.world.resource::<Editor>().status().expect("something is selected")
+        app.world.resource::<Editor>().status().unwrap()
     }
 
     /// Selects, even what is selected already.
