@@ -92,20 +92,21 @@ fn a_quick_report_has_all_files_and_its_figures_make_sense() {
     let slope = |name: &str| slope_of(name, "surfaces");
     assert!(methods.len() >= 7 && methods.iter().all(|m| m["runs"].as_array().unwrap().len() == 4));
     assert!((slope("random") + 0.5).abs() < 0.03, "{}", slope("random"));
-    // At so few pixels a fit is good to some hundredths. Adaptive samples go to the edge of the lamp first, which
-    // is most of the error of the whole picture, and none of that of the surfaces.
+    // At so few pixels a fit is good to some hundredths. What is left to sample are edges, above all that of the lamp.
     assert!(slope("even") < -0.55, "{}", slope("even"));
     let (ours, even) = (slope_of("ours", "all"), slope_of("even", "all"));
-    assert!(ours < -0.9 && even < -0.65, "{ours} {even}");
+    assert!(ours < -0.7 && even < -0.7, "{ours} {even}");
     // Each thing switched off costs something, at equal samples.
     let at_16 = |name: &str, of: &str| {
         let points = method(name)[of]["curve"].as_array().unwrap();
         points.iter().find(|p| p["samples"] == 16).unwrap()["rmse"].as_f64().unwrap()
     };
     assert!(at_16("ours", "all") < at_16("even", "all"));
-    for worse in ["random", "stratified", "random-light", "random-pixel"] {
+    for worse in ["random", "stratified", "random-pixel"] {
         assert!(at_16("even", "surfaces") < at_16(worse, "surfaces"), "{worse}");
     }
+    // Where all light is computed, how it would be sampled makes no difference.
+    assert!(at_16("ours", "surfaces") < 0.5 * at_16("no-shafts", "surfaces"));
     let check = &scene["noise_check"];
     assert_eq!(check["runs"], 100);
     assert!((check["unweighted"].as_f64().unwrap() - 1.0).abs() < 0.1, "{check}");
