@@ -4,11 +4,11 @@ use crate::image::develop::{Display, Picture, develop};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::{Playing, deform, play, propagate_transforms};
-use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin};
+use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin, Traceable};
 use crate::trace::noise;
 use crate::trace::{
-    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, TraceScene, Viewpoint,
-    trace_adaptive, trace_pass,
+    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, Viewpoint, trace_adaptive,
+    trace_pass,
 };
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
@@ -216,14 +216,8 @@ fn is_worth_developing(budget: Res<FrameBudget>, stats: Res<FrameStats>) -> bool
 }
 
 /// Adds samples to the film within the budget; first of all a preview, if somebody watches.
-#[expect(clippy::too_many_arguments, reason = "the six inputs of the picture, the film and its budget")]
 pub fn trace_frame(
-    geometry: Res<Geometry>,
-    surfaces: Res<Surfaces>,
-    coverage: Res<Coverage>,
-    lights: Res<Lights>,
-    viewpoint: Res<Viewpoint>,
-    settings: Res<RenderSettings>,
+    inputs: Traceable,
     budget: Res<FrameBudget>,
     mut film: ResMut<Film>,
     mut preview: ResMut<Preview>,
@@ -231,14 +225,7 @@ pub fn trace_frame(
     redone: Res<Redone>,
     mut previewed: Local<u64>,
 ) {
-    let scene = TraceScene {
-        geometry: &geometry,
-        surfaces: &surfaces,
-        coverage: &coverage,
-        lights: &lights,
-        viewpoint: &viewpoint,
-        settings: &settings,
-    };
+    let scene = inputs.scene();
     // Sample indices end with u32: nobody waits for those beyond.
     let target = budget.sample_target.min(u32::MAX - film.first_sample());
     let mut start = Instant::now();
@@ -255,7 +242,7 @@ pub fn trace_frame(
                 // So cheap that the film's own first pass is the preview.
                 None => {
                     rays = rays + trace_pass(&scene, &mut film, target.min(1), 1, || true);
-                    preview.note(start.elapsed(), f64::from(settings.size.element_product()));
+                    preview.note(start.elapsed(), f64::from(scene.settings.size.element_product()));
                 }
             }
             seconds = start.elapsed().as_secs_f64();

@@ -24,6 +24,7 @@ use crate::bvh::Isa;
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens};
 use crate::trace::{Coverage, Film, Geometry, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemParam;
 use glam::{DAffine3, DVec3};
 
 /// All that the picture depends on, as rays see it.
@@ -36,6 +37,47 @@ pub fn traceable(world: &World) -> TraceScene<'_> {
         lights: world.resource::<Lights>(),
         viewpoint: world.resource::<Viewpoint>(),
         settings: world.resource::<RenderSettings>(),
+    }
+}
+
+/// [`traceable`] for a system.
+#[derive(SystemParam)]
+pub struct Traceable<'w> {
+    geometry: Res<'w, Geometry>,
+    surfaces: Res<'w, Surfaces>,
+    coverage: Res<'w, Coverage>,
+    lights: Res<'w, Lights>,
+    viewpoint: Res<'w, Viewpoint>,
+    settings: Res<'w, RenderSettings>,
+}
+
+impl Traceable<'_> {
+    /// All that the picture depends on, as rays see it.
+    #[must_use]
+    pub fn scene(&self) -> TraceScene<'_> {
+        TraceScene {
+            geometry: &self.geometry,
+            surfaces: &self.surfaces,
+            coverage: &self.coverage,
+            lights: &self.lights,
+            viewpoint: &self.viewpoint,
+            settings: &self.settings,
+        }
+    }
+
+    /// Whether one of the things that the picture depends on is another than when this system ran last.
+    #[must_use]
+    pub fn is_changed(&self) -> bool {
+        self.scene_is_changed() || self.viewpoint.is_changed()
+    }
+
+    /// The same, without from where it is seen.
+    #[must_use]
+    pub fn scene_is_changed(&self) -> bool {
+        self.geometry.is_changed()
+            || self.surfaces.is_changed()
+            || self.lights.is_changed()
+            || self.settings.is_changed()
     }
 }
 
@@ -100,27 +142,14 @@ pub fn sync_viewpoint(
 }
 
 /// Starts the picture anew when one of its inputs changed. Nothing else ever does.
-pub fn reset_film(
-    geometry: Res<Geometry>,
-    surfaces: Res<Surfaces>,
-    lights: Res<Lights>,
-    viewpoint: Res<Viewpoint>,
-    settings: Res<RenderSettings>,
-    mut film: ResMut<Film>,
-    mut redone: ResMut<Redone>,
-) {
-    let changed = geometry.is_changed()
-        || surfaces.is_changed()
-        || lights.is_changed()
-        || viewpoint.is_changed()
-        || settings.is_changed();
-    if !changed {
+pub fn reset_film(inputs: Traceable, mut film: ResMut<Film>, mut redone: ResMut<Redone>) {
+    if !inputs.is_changed() {
         return;
     }
-    if film.size() == settings.size.max(glam::UVec2::ONE) {
+    if film.size() == inputs.settings.size.max(glam::UVec2::ONE) {
         film.reset();
     } else {
-        *film = Film::new(settings.size, film.first_sample());
+        *film = Film::new(inputs.settings.size, film.first_sample());
     }
     redone.resets += 1;
 }

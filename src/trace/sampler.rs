@@ -68,21 +68,16 @@ impl Sampler {
     /// Two numbers in [0, 1), stratified together over the samples of this pixel.
     #[must_use]
     pub fn pair(&self, dimension: u32) -> Vec2 {
-        let sampling = if dimension == 0 { self.pixel_sampling } else { self.sampling };
-        if sampling == Sampling::Sobol {
-            return sobol(self.seed, self.index, dimension);
-        }
         let seed = hash(self.seed ^ dimension.wrapping_mul(0x9e37_79b9));
         let (x_seed, y_seed) = (hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93));
-        let (x, y) = match sampling {
+        let (x, y) = match if dimension == 0 { self.pixel_sampling } else { self.sampling } {
+            Sampling::Sobol => return sobol(self.seed, self.index, dimension),
             Sampling::Shifted => {
                 // Shuffled all the same: otherwise all pairs would be the same points.
                 let index = owen_scramble(self.index, seed);
                 (index.reverse_bits().wrapping_add(x_seed), sobol_1(index).wrapping_add(y_seed))
             }
-            Sampling::Independent | Sampling::Sobol => {
-                (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index)))
-            }
+            Sampling::Independent => (hash(x_seed ^ hash(self.index)), hash(y_seed ^ hash(self.index))),
             Sampling::Stratified => {
                 let cell = shuffle_16(self.index & 15, hash(seed ^ hash(self.index >> 4)));
                 let within = |seed| hash(seed ^ hash(self.index)) >> 2;

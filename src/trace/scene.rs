@@ -86,6 +86,12 @@ impl Surface {
             && m.emission == Vec3::ZERO
             && !m.unlit
     }
+
+    /// The body behind the surface, if light can enter it.
+    #[must_use]
+    pub fn body(&self) -> Option<Body> {
+        self.layers.as_ref()?.transmission.as_ref()?.body
+    }
 }
 
 /// A texture and how to reach into it.
@@ -97,14 +103,6 @@ pub struct TextureIndex {
     pub uv_transform: Affine2,
     /// Whether it lies on the mesh's second set of coordinates.
     pub second_uvs: bool,
-}
-
-impl Surface {
-    /// The body behind the surface, if light can enter it.
-    #[must_use]
-    pub fn body(&self) -> Option<Body> {
-        self.layers.as_ref()?.transmission.as_ref()?.body
-    }
 }
 
 impl From<Material> for Surface {

@@ -11,11 +11,9 @@ use crate::image::{Display, Picture};
 use crate::report::false_color::ErrorScale;
 use crate::scene::SceneBounds;
 use crate::scene::color::{luminance, srgb_from_linear};
-use crate::sync::Redone;
+use crate::sync::{Redone, Traceable};
 use crate::trace::first::{Cost, FirstSurface, Grid, costs, first_surfaces};
-use crate::trace::{
-    Coverage, Film, Geometry, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint, noise,
-};
+use crate::trace::{Film, noise};
 use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec3};
 use std::sync::atomic::Ordering;
@@ -127,14 +125,8 @@ pub fn choose_pixel_view(
 }
 
 /// Brings the grids that are needed nearer to completion.
-#[expect(clippy::too_many_arguments, reason = "the whole scene")]
 pub fn refine_first_hits(
-    geometry: Res<Geometry>,
-    surfaces: Res<Surfaces>,
-    coverage: Res<Coverage>,
-    lights: Res<Lights>,
-    viewpoint: Res<Viewpoint>,
-    settings: Res<RenderSettings>,
+    inputs: Traceable,
     budget: Res<FrameBudget>,
     redone: Res<Redone>,
     view: Res<PixelView>,
@@ -143,14 +135,7 @@ pub fn refine_first_hits(
     mut pending: ResMut<Pending>,
 ) {
     use PixelView::{Albedo, Boxes, Depth, Normals, Triangles};
-    let scene = TraceScene {
-        geometry: &geometry,
-        surfaces: &surfaces,
-        coverage: &coverage,
-        lights: &lights,
-        viewpoint: &viewpoint,
-        settings: &settings,
-    };
+    let scene = inputs.scene();
     let needs_surfaces = matches!(*view, Normals | Albedo | Depth) || depth_wanted.0;
     let needs_costs = matches!(*view, Boxes | Triangles);
     if first.resets != redone.resets {
@@ -160,7 +145,7 @@ pub fn refine_first_hits(
     }
     let start = Instant::now();
     let keep_going = || start.elapsed() < GRID_TIME && !budget.interrupt.load(Ordering::Relaxed);
-    let size = settings.size.max(UVec2::ONE);
+    let size = scene.settings.size.max(UVec2::ONE);
     if needs_surfaces && first.surfaces.as_ref().is_none_or(|grid| !grid.is_complete()) {
         let grid = first.surfaces.get_or_insert_with(|| Grid::new(size));
         grid.refine(keep_going, |places, values| first_surfaces(&scene, places, values));

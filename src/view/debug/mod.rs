@@ -10,9 +10,9 @@ use super::pixel_view::{DepthWanted, FirstHits};
 use crate::bvh::inspect::{Order, Step, Visited, Visits};
 use crate::bvh::{Hit, Tlas};
 use crate::scene::SceneBounds;
-use crate::sync::Redone;
+use crate::sync::{Redone, Traceable};
 use crate::trace::explain::{Explanation, Kind, explain};
-use crate::trace::{Coverage, Film, Geometry, Lights, RenderSettings, Surfaces, TraceScene, Viewpoint};
+use crate::trace::{Film, RenderSettings, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use boxes::{Boxes, Placed, Statistics};
 use glam::{DVec2, UVec2};
@@ -163,51 +163,38 @@ pub fn change_debug(
 }
 
 /// Explains the pinned pixel, and counts the hierarchy, whenever they may have changed.
-#[expect(clippy::too_many_arguments, reason = "the whole scene")]
 pub fn explain_pinned(
-    geometry: Res<Geometry>,
-    surfaces: Res<Surfaces>,
-    coverage: Res<Coverage>,
-    lights: Res<Lights>,
-    settings: Res<RenderSettings>,
+    inputs: Traceable,
     film: Res<Film>,
     bounds: Option<Res<SceneBounds>>,
     mut debug: ResMut<Debug>,
     mut lines: ResMut<DebugLines>,
 ) {
-    let scene_changed =
-        geometry.is_changed() || surfaces.is_changed() || lights.is_changed() || settings.is_changed();
-    if !(debug.is_changed() || scene_changed) {
+    if !(debug.is_changed() || inputs.scene_is_changed()) {
         return;
     }
+    let seen = inputs.scene();
     let debug = debug.bypass_change_detection();
     let mut drawn = Vec::new();
     debug.statistics = None;
     if debug.boxes != Boxes::Off {
-        let (boxes, statistics) = boxes::show(&geometry.tlas, debug.boxes);
+        let (boxes, statistics) = boxes::show(&seen.geometry.tlas, debug.boxes);
         drawn.extend(boxes);
         debug.statistics = Some(Arc::new(statistics));
     }
     debug.told =
-        debug.pinned.filter(|(pixel, _)| pixel.cmplt(settings.size).all()).map(|(pixel, viewpoint)| {
-            let scene = TraceScene {
-                geometry: &geometry,
-                surfaces: &surfaces,
-                coverage: &coverage,
-                lights: &lights,
-                viewpoint: &viewpoint,
-                settings: &settings,
-            };
+        debug.pinned.filter(|(pixel, _)| pixel.cmplt(seen.settings.size).all()).map(|(pixel, viewpoint)| {
+            let scene = TraceScene { viewpoint: &viewpoint, ..seen };
             let far = bounds.map_or(10.0, |bounds| 2.0 * bounds.radius as f32);
             let first = film.first_sample();
             let explanation = explain(&scene, pixel, first..first.saturating_add(SAMPLES), far);
-            Arc::new(tell(&geometry.tlas, explanation))
+            Arc::new(tell(&seen.geometry.tlas, explanation))
         });
     if let Some(told) = &debug.told {
         drawn.extend(ray_lines(&told.explanation));
         let steps = &told.steps[debug.order as usize];
         debug.step = debug.step.min(steps.len());
-        drawn.extend(step_lines(&geometry.tlas, &steps[..debug.step]));
+        drawn.extend(step_lines(&seen.geometry.tlas, &steps[..debug.step]));
     }
     lines.0 = drawn;
 }
