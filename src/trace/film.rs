@@ -175,8 +175,8 @@ impl Tile {
     /// What [`Tile::more`] is to be of a pixel when it has its share of `beyond` samples.
     #[must_use]
     pub(super) fn goal(&self, pixel: usize, beyond: u32) -> u32 {
-        // Saturates.
-        (f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32
+        // Saturates; and sample indices end with u32.
+        ((f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32).min(u32::MAX - self.next_sample)
     }
 
     /// Index of the sample that comes next in a pixel: what is missing below it was dropped.
@@ -378,6 +378,16 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_share_goes_beyond_the_last_index() {
+        let mut film = Film::new(UVec2::ONE, u32::MAX - 10);
+        film.tiles_mut()[0].next_sample += 4;
+        film.allot(&[100.0]);
+        let tile = &film.tiles()[0];
+        assert_eq!(tile.goal(0, 3), 6);
+        assert_eq!(tile.goal(0, u32::MAX), 6);
+    }
 
     #[test]
     fn small_samples_are_added_as_all_are() {
