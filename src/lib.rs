@@ -18,6 +18,7 @@ pub mod render;
 pub mod report;
 pub mod scene;
 pub mod sync;
+pub mod torture;
 pub mod trace;
 #[cfg(feature = "view")]
 pub mod view;

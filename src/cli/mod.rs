@@ -51,10 +51,44 @@ pub enum Command {
     Merge(MergeArgs),
     /// Measure speed and error over time, and write tables, curves and a page
     Report(ReportArgs),
+    /// Try numerical stability on hard cases, and print what held
+    Torture(TortureArgs),
     /// Print a script that completes commands in a shell: penumbra completions bash > FILE
     Completions(CompletionsArgs),
     /// Print the manual page: penumbra man > penumbra.1
     Man,
+}
+
+/// Arguments of `torture`.
+#[derive(Debug, Args)]
+pub struct TortureArgs {
+    /// Only this case, such as G1 (may be given several times) [default: all]
+    #[arg(long, value_name = "ID")]
+    pub case: Vec<String>,
+    /// For hours: 10^9 rays, 10^8 samples
+    #[arg(long)]
+    pub long: bool,
+    /// For seconds: few rays and samples
+    #[arg(long, conflicts_with = "long")]
+    pub quick: bool,
+    /// Another seed, other rays
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Name the cases and what must hold
+    #[arg(long)]
+    pub list: bool,
+    /// Print every check as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Print the table as Markdown
+    #[arg(long, conflicts_with = "json")]
+    pub markdown: bool,
+    /// Threads to use; 0 = all
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// No progress on standard error
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Arguments of `completions`.

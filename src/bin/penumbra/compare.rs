@@ -1,0 +1,30 @@
+//! `compare`.
+
+use crate::exit;
+use penumbra::cli::CompareArgs;
+use penumbra::image::compare::compare_files;
+
+/// Says how much two pictures differ.
+pub fn run(args: &CompareArgs) -> u8 {
+    let difference = match compare_files(&args.a, &args.b) {
+        Ok(difference) => difference,
+        Err(error) => return exit::because(&error, exit::FAILED),
+    };
+    if args.json {
+        match serde_json::to_string(&difference) {
+            Ok(json) => println!("{json}"),
+            Err(error) => return exit::because(&error, exit::FAILED),
+        }
+    } else {
+        let [x, y] = difference.max_at;
+        println!("RMSE      {:.6e}", difference.rmse);
+        println!("relMSE    {:.6e}", difference.relative_mse);
+        println!("max error {:.6e} at pixel {x},{y}", difference.max_error);
+        println!("mean      {:+.6e}", difference.bias);
+        if difference.not_finite > 0 {
+            println!("{} values are not finite and were left out", difference.not_finite);
+        }
+    }
+    let failed = |limit: f64| difference.not_finite > 0 || difference.rmse > limit;
+    if args.fail_above.is_some_and(failed) { exit::ABOVE_LIMIT } else { 0 }
+}

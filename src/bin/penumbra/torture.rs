@@ -1,0 +1,87 @@
+//! `torture`.
+
+use crate::bar::Bar;
+use crate::exit;
+use crate::signal::{set_threads, stop_on_signals};
+use penumbra::cli::TortureArgs;
+use penumbra::torture::{self, Case, Effort, Trial, Tried};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// Tries the cases asked for, and prints the table.
+pub fn run(args: &TortureArgs) -> u8 {
+    let all = torture::cases();
+    if args.list {
+        for case in &all {
+            println!("{:<4} {}: {}", case.id, case.title, case.limit);
+        }
+        return 0;
+    }
+    let cases = match chosen(&all, &args.case) {
+        Ok(cases) => cases,
+        Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
+    };
+    set_threads(args.threads);
+    let interrupt = Arc::new(AtomicBool::new(false));
+    stop_on_signals(&interrupt);
+    let bar = Mutex::new(Bar::new(args.quiet));
+    let mut tried: Vec<Tried> = Vec::new();
+    for (i, case) in cases.iter().enumerate() {
+        let progress = |step: torture::Step| {
+            if let Ok(bar) = bar.lock() {
+                let part = (i as f64 + step.part) / cases.len() as f64;
+                bar.show(part, format!("{} {}: {}", step.id, case.title, step.what));
+            }
+        };
+        let effort = match (args.long, args.quick) {
+            (true, _) => Effort::Long,
+            (_, true) => Effort::Quick,
+            _ => Effort::Normal,
+        };
+        let trial = Trial { effort, seed: args.seed, progress: &progress, interrupt: &interrupt };
+        trial.tell(case.id, "begins", 0.0);
+        tried.push(torture::run(case, &trial));
+        if interrupt.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    if let Ok(bar) = bar.lock() {
+        bar.clear();
+    }
+    if let Err(error) = print(&tried, args) {
+        return exit::because(&error, exit::FAILED);
+    }
+    if interrupt.load(Ordering::Relaxed) {
+        exit::INTERRUPTED
+    } else if tried.iter().all(Tried::holds_but_for_what_is_stated) {
+        0
+    } else {
+        exit::ABOVE_LIMIT
+    }
+}
+
+fn chosen(all: &[Case], wanted: &[String]) -> Result<Vec<Case>, String> {
+    if wanted.is_empty() {
+        return Ok(all.to_vec());
+    }
+    let find = |id: &String| {
+        let case = all.iter().find(|case| case.id.eq_ignore_ascii_case(id)).copied();
+        case.ok_or_else(|| format!("--case {id}: there is no such case; --list names them"))
+    };
+    wanted.iter().map(find).collect()
+}
+
+fn print(tried: &[Tried], args: &TortureArgs) -> serde_json::Result<()> {
+    if args.json {
+        println!("{}", torture::json(tried)?);
+    } else if args.markdown {
+        print!("{}", torture::markdown(tried));
+    } else {
+        for [id, title, count, ours, limit, verdict] in torture::rows(tried) {
+            println!(
+                "{id:<4} {verdict:<7} {title}\n     tried {count}\n     ours  {ours}\n     limit {limit}"
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,84 @@
+//! The window, or a picture where there is none.
+
+use crate::headless;
+#[cfg(feature = "view")]
+use crate::{exit, signal::set_threads};
+use penumbra::cli::WindowArgs;
+#[cfg(feature = "view")]
+use penumbra::{app::FrameBudget, open::open, render::open_reference, trace::RenderSettings};
+
+/// Where the window comes to rest, if nobody says.
+#[cfg(feature = "view")]
+const WINDOW_SAMPLES: u32 = 1024;
+
+#[cfg(not(feature = "view"))]
+pub fn run(args: &WindowArgs) -> u8 {
+    eprintln!("built without the window (feature `view`): rendering to a picture instead");
+    instead_of_window(args)
+}
+
+#[cfg(feature = "view")]
+pub fn run(args: &WindowArgs) -> u8 {
+    use penumbra::view::{ViewError, ViewOptions};
+    let source = match args.scene.source() {
+        Ok(source) => source,
+        Err(error) => return exit::because(&error, exit::SCENE_NOT_READABLE),
+    };
+    set_threads(args.scene.threads);
+    let keys = match penumbra::view::keys_file::read(args.keys.as_deref()) {
+        Ok(keys) => keys,
+        Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
+    };
+    let replay = args.replay.as_deref().map(penumbra::view::replay::Replay::open).transpose();
+    let record = args.record.as_deref().map(penumbra::view::replay::Recorder::create).transpose();
+    let (replay, record) = match replay.and_then(|replay| Ok((replay, record?))) {
+        Ok(both) => both,
+        Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
+    };
+    let replays = replay.is_some();
+    let reference = match args.output.reference.as_deref().map(open_reference).transpose() {
+        Ok(reference) => reference,
+        Err(error) => return exit::because(&error, exit::FAILED),
+    };
+    let (wishes, even) = (args.scene.wishes(&args.output), args.scene.even);
+    let options = ViewOptions {
+        title: format!("Penumbra – {}", source.name()),
+        size: wishes.size.unwrap_or(RenderSettings::default().size),
+        screenshot_stem: source.name(),
+        reference,
+        keys,
+        replay,
+        record,
+        exit_after: None,
+    };
+    let load = args.scene.load_options();
+    let opened = penumbra::view::run(options, move || match open(&source, &load, &wishes) {
+        Ok(mut opened) => {
+            headless::tell(&opened.report);
+            let mut budget = opened.app.world.resource_mut::<FrameBudget>();
+            budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
+            budget.adaptive = opened.samples.is_none() && !even;
+            Ok(opened.app)
+        }
+        Err(error) => Err(error.to_string()),
+    });
+    match opened {
+        Ok(response) => {
+            if replays {
+                println!("{}", response.json());
+            }
+            0
+        }
+        Err(ViewError::NoDisplay(why)) => {
+            eprintln!("no window: {why}; rendering to a picture instead");
+            instead_of_window(args)
+        }
+        Err(ViewError::Scene(error)) => exit::because(&error, exit::SCENE_NOT_READABLE),
+        Err(error) => exit::because(&error, exit::FAILED),
+    }
+}
+
+/// Renders what the window would have shown to a picture.
+fn instead_of_window(args: &WindowArgs) -> u8 {
+    headless::render_to(&args.scene, &args.output, vec![headless::picture_of(&args.scene)])
+}

@@ -1,0 +1,159 @@
+//! Numerical stability, tried: hard cases with exact answers, as anyone can run them on their machine.
+//!
+//! A [`Case`] is one way in which ray tracers break. It runs at every [`Place`] and with every set of
+//! instructions that matters to it, and gives a [`Check`] for each: what was counted, and the limit that
+//! it must keep. Limits are those of theory (zero leaks, so many ulp, 4.5 standard errors), not of what
+//! was measured.
+
+mod geometry;
+mod light;
+mod place;
+mod table;
+mod trial;
+
+pub use place::Place;
+pub use table::{json, markdown, rows};
+pub use trial::{Effort, Step, Trial};
+
+use serde::Serialize;
+
+/// One way to break.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// Short and stable, such as `G1`.
+    pub id: &'static str,
+    /// What is tried, in a few words.
+    pub title: &'static str,
+    /// What must hold, in words.
+    pub limit: &'static str,
+    /// Tries it.
+    pub run: fn(&Trial<'_>) -> Vec<Check>,
+}
+
+/// One measured figure and its limit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// Of what: mesh, place, kernel.
+    pub what: String,
+    /// How many were tried.
+    pub tried: u64,
+    /// What they are.
+    pub unit: &'static str,
+    /// What came out: smaller is better.
+    pub ours: f64,
+    /// The most that is right.
+    pub limit: f64,
+    /// Why it may not be kept, if that is known and stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excuse: Option<&'static str>,
+}
+
+impl Check {
+    /// `ours` of `tried` may be at most `limit`.
+    #[must_use]
+    pub fn new(what: impl Into<String>, tried: u64, unit: &'static str, ours: f64, limit: f64) -> Self {
+        Self { what: what.into(), tried, unit, ours, limit, excuse: None }
+    }
+
+    /// None of `tried` may be wrong.
+    #[must_use]
+    pub fn none(what: impl Into<String>, tried: u64, unit: &'static str, wrong: u64) -> Self {
+        Self::new(what, tried, unit, wrong as f64, 0.0)
+    }
+
+    /// Whether the limit is kept. What is not a number keeps none, nor does what tried nothing.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.tried > 0 && self.ours <= self.limit
+    }
+}
+
+/// What a case came to.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tried {
+    /// Which case.
+    pub id: &'static str,
+    /// What was tried.
+    pub title: &'static str,
+    /// What must hold.
+    pub limit: &'static str,
+    /// All that was measured.
+    pub checks: Vec<Check>,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+impl Tried {
+    /// Whether all limits are kept.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        !self.checks.is_empty() && self.checks.iter().all(Check::holds)
+    }
+
+    /// Whether all limits are kept but those whose breach is stated.
+    #[must_use]
+    pub fn holds_but_for_what_is_stated(&self) -> bool {
+        !self.checks.is_empty() && self.checks.iter().all(|check| check.holds() || check.excuse.is_some())
+    }
+
+    /// The check that is furthest from keeping its limit.
+    #[must_use]
+    pub fn worst(&self) -> Option<&Check> {
+        let badness = |check: &Check| if check.limit > 0.0 { check.ours / check.limit } else { check.ours };
+        self.checks.iter().max_by(|a, b| badness(a).total_cmp(&badness(b)))
+    }
+}
+
+/// All cases, in the order of the table.
+#[must_use]
+pub fn cases() -> Vec<Case> {
+    [geometry::CASES, light::CASES].concat()
+}
+
+/// Runs `case`.
+#[must_use]
+pub fn run(case: &Case, trial: &Trial<'_>) -> Tried {
+    let start = std::time::Instant::now();
+    let checks = (case.run)(trial);
+    Tried {
+        id: case.id,
+        title: case.title,
+        limit: case.limit,
+        checks,
+        seconds: start.elapsed().as_secs_f64(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tried(checks: Vec<Check>) -> Tried {
+        Tried { id: "X1", title: "", limit: "", checks, seconds: 0.0 }
+    }
+
+    #[test]
+    fn a_limit_is_kept_or_not() {
+        assert!(Check::none("", 10, "rays", 0).holds());
+        assert!(!Check::none("", 10, "rays", 1).holds());
+        assert!(!Check::none("", 0, "rays", 0).holds(), "nothing tried, nothing shown");
+        assert!(!Check::new("", 10, "ulp", f64::NAN, 1.0).holds());
+        assert!(!tried(Vec::new()).holds());
+    }
+
+    #[test]
+    fn an_excuse_is_no_verdict() {
+        let broken = Check { excuse: Some("why"), ..Check::none("", 10, "rays", 1) };
+        let both = tried(vec![Check::none("", 10, "rays", 0), broken]);
+        assert!(!both.holds() && both.holds_but_for_what_is_stated());
+        assert_eq!(both.worst().map(|check| check.ours), Some(1.0));
+    }
+
+    #[test]
+    fn ids_are_unique() {
+        let mut ids: Vec<_> = cases().iter().map(|case| case.id).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), cases().len());
+    }
+}
