@@ -21,7 +21,7 @@ use crate::bvh::{Aabb, Ray};
 use glam::{UVec2, Vec3};
 
 /// Pixels that share: a power of two, at most half of a tile.
-pub const MEMBERS: usize = 16;
+pub const MEMBERS: usize = 32;
 const GROUPS: usize = (TILE * TILE) as usize / MEMBERS;
 /// Rays between neighbours that are traced together.
 const RAYS: usize = 4096;
@@ -258,7 +258,8 @@ impl Batch {
                             lanes.weigh(scene, target, normal, shading);
                             let own = lanes.density[m];
                             if own > 0.0 && own.is_finite() {
-                                let ways = lanes.ways(scene, m, [target, normal], &mut reuse.rays, &mut reuse.ways);
+                                let ways =
+                                    lanes.ways(scene, m, [target, normal], &mut reuse.rays, &mut reuse.ways);
                                 Shared { entry, density: own, ways }
                             } else {
                                 alone
