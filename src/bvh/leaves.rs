@@ -206,15 +206,8 @@ impl Leaves {
                 let close = distance.close.bits();
                 let t_max: S::F16 = packet.rays.t_max.get(simd, group);
                 if doubtful != 0 {
-                    let (t, margin) = (distance.t, distance.margin);
-                    doubtful &= !distance.rough.and((t_max + margin).lt(t)).bits();
-                    if ANY && takes.is_none() {
-                        // That there is a hit is enough.
-                        let between = margin.lt(t).and((t + margin).lt(t_max));
-                        let surely = distance.rough.and(between).bits() & doubtful;
-                        done |= u64::from(surely) << base;
-                        doubtful &= !surely;
-                    }
+                    let beyond = distance.rough.and((t_max + distance.margin).lt(distance.t));
+                    doubtful &= !beyond.bits();
                 }
                 let u = edges.weights[1] * distance.inverse_determinant;
                 let v = edges.weights[2] * distance.inverse_determinant;
