@@ -9,7 +9,7 @@ use penumbra::app::FrameBudget;
 use penumbra::scene::{Light, Material};
 use penumbra::trace::allot::{EVEN, shares};
 use penumbra::trace::{Film, Integrator, RenderSettings, TraceScene, trace_adaptive, trace_pass};
-use stage::{Stage, quad, reds, settings};
+use stage::{Frames as _, Stage, quad, reds, settings};
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 

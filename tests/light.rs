@@ -14,7 +14,7 @@ mod stage;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use penumbra::scene::{Emission, Light, Material, TriangleMesh};
 use penumbra::trace::{Film, Integrator};
-use stage::{Estimate, Stage, cube, grid, quad, reds, settings};
+use stage::{Estimate, Exact as _, Frames as _, Stage, cube, grid, quad, reds, settings};
 use std::f64::consts::PI;
 
 const ALBEDO: f32 = 0.8;

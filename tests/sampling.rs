@@ -23,7 +23,7 @@ use penumbra::trace::noise::relative_error;
 use penumbra::trace::quad::Quad;
 use penumbra::trace::shape_light::{Shape, ShapeLight};
 use penumbra::trace::{Integrator, RenderSettings};
-use stage::{Estimate, Rng, Stage, quad, reds, settings};
+use stage::{Estimate, Frames as _, Rng, Stage, quad, reds, settings};
 use std::f64::consts::PI;
 
 const POINT: Vec3 = Vec3::new(0.2, -0.1, 0.05);

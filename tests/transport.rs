@@ -18,7 +18,7 @@ use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::light::FlatLight;
 use penumbra::trace::surface::Interaction;
 use penumbra::trace::{Integrator, Lights};
-use stage::{Estimate, Rng, Stage, ball, cube, quad, reds, settings};
+use stage::{Estimate, Exact as _, Frames as _, Rng, Stage, ball, cube, quad, reds, settings};
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 

@@ -1,6 +1,6 @@
 //! The kinds of surfaces that are judged, each as a point of a floor whose normal is +Z and whose tangent is +X.
 
-use crate::stage::{Stage, settings};
+use crate::stage::{Frames as _, Stage, settings};
 use glam::{Vec2, Vec3, Vec4};
 use penumbra::scene::{Anisotropy, Body, Clearcoat, Glossy, Layers, Material, Sheen, Transmission};
 use penumbra::trace::Integrator;

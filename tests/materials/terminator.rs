@@ -1,6 +1,6 @@
 //! The edge of the shadow on coarse meshes with smooth normals.
 
-use crate::stage::{Stage, ball, cube, quad, reds, settings};
+use crate::stage::{Frames as _, Stage, ball, cube, quad, reds, settings};
 use glam::{DAffine3, DVec3, Vec3};
 use penumbra::scene::{Light, Material, TriangleMesh};
 use penumbra::trace::Integrator;
