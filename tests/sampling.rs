@@ -109,7 +109,7 @@ fn each_light_is_sampled_as_its_density_says() {
         let (a, b) = back(d);
         let distance = (c - from).dot(normal) / d.dot(normal);
         let cos = normal.normalize().dot(d).abs();
-        f64::from(mesh.pdf(if a > b { 3 } else { 7 }, (distance * distance) as f32, cos as f32))
+        f64::from(mesh.pdf(if a > b { 3 } else { 7 }, POINT, (distance * distance) as f32, cos as f32))
     };
     let flat = FlatLight::Mesh(mesh.clone());
     sampler_against_density(

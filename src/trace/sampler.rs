@@ -127,6 +127,12 @@ impl<const N: usize> SamplerRow<N> {
         (self.seeds[i], self.indices[i]) = (sampler.seed, sampler.index);
     }
 
+    /// The one at its place.
+    #[must_use]
+    pub fn get(&self, i: usize) -> Sampler {
+        Sampler { seed: self.seeds[i], index: self.indices[i], ..self.like }
+    }
+
     /// [`Sampler::pair`] of each.
     #[inline(always)]
     pub fn pairs(&self, dimension: u32, x: &mut [f32; N], y: &mut [f32; N]) {
@@ -138,8 +144,7 @@ impl<const N: usize> SamplerRow<N> {
             }
         } else {
             for i in 0..N {
-                let sampler = Sampler { seed: self.seeds[i], index: self.indices[i], ..self.like };
-                let pair = sampler.pair(dimension);
+                let pair = self.get(i).pair(dimension);
                 (x[i], y[i]) = (pair.x, pair.y);
             }
         }

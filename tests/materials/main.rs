@@ -13,7 +13,6 @@ mod chi_square;
 mod energy;
 #[path = "../support/geometry.rs"]
 mod geometry;
-mod kinds;
 mod normals;
 mod samplers;
 #[path = "../support/stage.rs"]

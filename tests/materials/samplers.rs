@@ -1,9 +1,9 @@
 //! Every lobe's sampler against its density, and value over density against the weight (χ², 1 % for all together).
 
 use crate::chi_square::{CELLS, SAMPLES, sampler_against_density};
-use crate::kinds::{Seen, glossy_kinds, layered_kinds};
 use crate::stage::Rng;
 use glam::{DVec3, Vec3};
+use penumbra::torture::light::kinds::{Seen, glossy_kinds, layered_kinds};
 use penumbra::trace::bsdf::Lobes;
 use std::f64::consts::PI;
 

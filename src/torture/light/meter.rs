@@ -78,7 +78,8 @@ pub const BOUND: f64 = 1e-3;
 #[must_use]
 pub fn judge(what: &str, ask: &Ask, reading: &Reading, same: Option<&Reading>) -> Vec<Check> {
     let count = reading.pixels.len() as u64;
-    let wrong = |is_wrong: &dyn Fn(f64) -> bool| reading.pixels.iter().filter(|p| is_wrong(**p)).count() as u64;
+    let wrong =
+        |is_wrong: &dyn Fn(f64) -> bool| reading.pixels.iter().filter(|p| is_wrong(**p)).count() as u64;
     let mut checks = Vec::new();
     if reading.dropped > 0 {
         checks.push(Check::none(format!("{what}: no number"), reading.samples, "samples", reading.dropped));
@@ -90,7 +91,7 @@ pub fn judge(what: &str, ask: &Ask, reading: &Reading, same: Option<&Reading>) -
             checks.push(Check::none(format!("{what}: exactly dark"), count, "pixels", lit));
         }
         Expected::Finite => {
-            let odd = wrong(&|p| !(0.0..=PI * (1.0 + BOUND)).contains(&p));
+            let odd = wrong(&|p| !(0.0..=4.0 * PI).contains(&p));
             checks.push(Check::none(format!("{what}: finite"), count, "pixels", odd));
         }
         Expected::Same(_) => {

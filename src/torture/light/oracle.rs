@@ -28,7 +28,10 @@ pub fn above_horizon(corners: &[DVec3], point: DVec3, normal: DVec3) -> Vec<DVec
 /// Reference: J. H. Lambert, "Photometria", 1760; by arctangents, which hold for small angles too.
 #[must_use]
 pub fn polygon(corners: &[DVec3], point: DVec3, normal: DVec3) -> f64 {
-    0.5 * edges(&above_horizon(corners, point, normal), point, normal).map(|(part, _)| part).sum::<f64>().abs()
+    0.5 * edges(&above_horizon(corners, point, normal), point, normal)
+        .map(|(part, _)| part)
+        .sum::<f64>()
+        .abs()
 }
 
 /// The same without regard to the horizon: what many forget.

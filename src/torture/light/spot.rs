@@ -70,7 +70,7 @@ pub enum Expected {
     Dark,
     /// To the bit what arrives there.
     Same(Box<Spot>),
-    /// A number from 0 to π and a little: the place has no answer, or several.
+    /// A number from 0 to 4 π, the most that samples of a ball around the place can bring: it has no answer, or several.
     Finite,
 }
 
