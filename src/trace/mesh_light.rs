@@ -1,8 +1,8 @@
 //! Emissive meshes: their triangles as one light.
 
 use super::light::{LightSample, sample_at, sample_flat};
-use super::spherical::SphericalTriangle;
-use glam::{DVec3, Vec2, Vec3};
+use super::spherical::{SphericalTriangle, meet, weights};
+use glam::{Vec2, Vec3};
 
 /// Triangles of an emissive instance, chosen in proportion to their emitted power.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,9 +38,11 @@ impl MeshLight {
         let normal = cross.try_normalize()? * if self.mirrored { -1.0 } else { 1.0 };
         let (sample, [b1, b2]) = if is_near(corners, point) {
             let seen = seen_from(corners, point)?;
-            let weights = weights_on(corners, point, seen.sample(f64::from(rest), f64::from(u.y)));
+            let corners = corners.map(Vec3::as_dvec3);
+            let position = meet(&corners, point, seen.sample(f64::from(rest), f64::from(u.y)))?;
+            let weights = weights(corners[0], corners[1] - corners[0], corners[2] - corners[0], position);
             let pdf = (f64::from(share) / seen.solid_angle) as f32;
-            (sample_at(point, at(weights), normal, pdf, self.two_sided, Vec3::ONE)?, weights)
+            (sample_at(point, position.as_vec3(), normal, pdf, self.two_sided, Vec3::ONE)?, weights)
         } else {
             let s = rest.sqrt();
             let weights = [s * (1.0 - u.y), s * u.y];
@@ -76,18 +78,6 @@ fn is_near([a, b, c]: &[Vec3; 3], point: Vec3) -> bool {
 
 fn seen_from(corners: &[Vec3; 3], point: Vec3) -> Option<SphericalTriangle> {
     SphericalTriangle::new(corners.map(|p| p.as_dvec3() - point.as_dvec3()))
-}
-
-/// Barycentric weights of the second and third corner where the direction `toward` from `point` ends.
-fn weights_on(corners: &[Vec3; 3], point: Vec3, toward: DVec3) -> [f32; 2] {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let (u, v, from) = (b - a, c - a, point.as_dvec3() - a);
-    let normal = u.cross(v);
-    let p = from - toward * (from.dot(normal) / toward.dot(normal));
-    let inverse = 1.0 / normal.length_squared();
-    let b1 = (p.cross(v).dot(normal) * inverse).clamp(0.0, 1.0);
-    let b2 = (u.cross(p).dot(normal) * inverse).clamp(0.0, 1.0 - b1);
-    [b1 as f32, b2 as f32]
 }
 
 /// Area of a triangle.

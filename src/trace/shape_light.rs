@@ -1,8 +1,8 @@
 //! Area lights with a shape of their own: sampled like all lights, and solid to rays.
 
 use super::light::{LightSample, error_of, sample_at, sample_flat};
-use super::quad::{Place, Quad};
-use super::spherical::{SphericalQuad, place_on};
+use super::quad::Quad;
+use super::spherical::{SphericalQuad, meet, weights};
 use super::warp::{cone, cone_pdf, offset, uniform_sphere};
 use crate::bvh::{Aabb, Ray};
 use glam::{DVec3, Vec2, Vec3};
@@ -64,10 +64,11 @@ impl ShapeLight {
         match &self.shape {
             Shape::Parallelogram(quad) if quad.is_near(point) => {
                 let seen = SphericalQuad::new(quad, point)?;
-                let Vec2 { x: a, y: b } = place_on(quad, point, seen.sample(u)?);
-                let position = quad.at(&Place { a, b, density: 1.0 });
-                let (pdf, radiance) = ((1.0 / seen.solid_angle) as f32, self.radiance_at(Vec2::new(a, b)));
-                sample_at(point, position, self.normal, pdf, self.two_sided, radiance)
+                let corners = quad.corners().map(Vec3::as_dvec3);
+                let position = meet(&corners, point, seen.sample(u)?)?;
+                let place = weights(corners[0], quad.u.as_dvec3(), quad.v.as_dvec3(), position);
+                let (pdf, radiance) = ((1.0 / seen.solid_angle) as f32, self.radiance_at(place.into()));
+                sample_at(point, position.as_vec3(), self.normal, pdf, self.two_sided, radiance)
             }
             Shape::Parallelogram(quad) => {
                 let place = quad.brightness(point, normal).sample(u);

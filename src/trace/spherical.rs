@@ -93,17 +93,24 @@ impl SphericalQuad {
     }
 }
 
-/// Where on `quad` the direction `toward` from `point` ends: in units of its edges, in 0..=1.
+/// Where the direction `toward` from `point` meets the plane of `corners`, no farther away than any of them: from the point
+/// itself, so that it is as exact as the direction. `None` if it runs along the plane.
 #[must_use]
-pub fn place_on(quad: &Quad, point: Vec3, toward: DVec3) -> Vec2 {
-    let (u, v) = (quad.u.as_dvec3(), quad.v.as_dvec3());
-    let normal = u.cross(v);
-    let from = point.as_dvec3() - quad.corner.as_dvec3();
-    let p = from - toward * (from.dot(normal) / toward.dot(normal));
+pub fn meet(corners: &[DVec3], point: Vec3, toward: DVec3) -> Option<DVec3> {
+    let point = point.as_dvec3();
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let farthest = corners.iter().map(|p| p.distance(point)).fold(0.0, f64::max);
+    let t = ((corners[0] - point).dot(normal) / toward.dot(normal)).min(farthest);
+    (t > 0.0).then(|| point + toward * t)
+}
+
+/// Weights of `u` and `v` in the point `p` of the parallelogram or triangle that they span from `corner`; about 0 to 1.
+#[must_use]
+pub fn weights(corner: DVec3, u: DVec3, v: DVec3, p: DVec3) -> [f32; 2] {
+    let (normal, p) = (u.cross(v), p - corner);
     let inverse = 1.0 / normal.length_squared();
-    let place =
-        Vec2::new((p.cross(v).dot(normal) * inverse) as f32, (u.cross(p).dot(normal) * inverse) as f32);
-    place.clamp(Vec2::ZERO, Vec2::ONE)
+    let weight = |volume: f64| (volume * inverse).clamp(0.0, 1.0) as f32;
+    [weight(p.cross(v).dot(normal)), weight(u.cross(p).dot(normal))]
 }
 
 fn seen_from(quad: &Quad, point: Vec3) -> [DVec3; 4] {
@@ -198,7 +205,7 @@ mod tests {
             let toward = seen.sample(Vec2::new(x, y)).unwrap();
             assert!((toward.length() - 1.0).abs() < 1e-9 && toward.z > -1e-9, "{toward}");
         }
-        assert!((irradiance(&quad, Vec3::ZERO, [Vec3::Z; 2]) - 3.14159265358).abs() < 1e-10);
+        assert!((irradiance(&quad, Vec3::ZERO, [Vec3::Z; 2]) - PI).abs() < 1e-10);
     }
 
     #[test]

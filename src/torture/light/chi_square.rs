@@ -22,14 +22,13 @@ pub struct Draws {
     pub seed: u64,
     /// Cells on a side of the square.
     pub cells: usize,
+    /// Places on a side of the square at which the density is asked, a multiple of `cells`.
+    pub fine: usize,
     /// The level of significance of all tests together, and how many there are (Z. Šidák, 1967).
     pub level: f64,
     /// See `level`.
     pub tests: u32,
 }
-
-/// Places in each cell where the density is asked, on a side of the whole square.
-const FINE: usize = 1024;
 
 /// Sampler against density: χ² of counts in cells of a square that is mapped onto directions, and the density's integral.
 pub fn compare(
@@ -51,7 +50,7 @@ pub fn compare(
         });
         seen[cell] += 1.0;
     }
-    let fine = FINE / side;
+    let fine = draws.fine / side;
     let mut expected: Vec<f64> = (0..n)
         .map(|cell| {
             let at = |i: usize, k: usize| (i as f64 + (k as f64 + 0.5) / fine as f64) / side as f64;
@@ -60,7 +59,7 @@ pub fn compare(
                 let (wi, area) = (map.direction)(at(cell / side, k), at(cell % side, l));
                 sum += if area > 0.0 { density(wi.as_vec3()) * area } else { 0.0 };
             }
-            sum / (FINE * FINE) as f64 * draws.count as f64
+            sum / (fine * side).pow(2) as f64 * draws.count as f64
         })
         .collect();
     let total: f64 = expected.iter().sum::<f64>() / draws.count as f64;

@@ -45,7 +45,7 @@ pub fn either_side_of_a_switch() -> Vec<Spot> {
     }
     // An emissive triangle whose middle is as far as half of its longest edge.
     for height in around(1.25f64.sqrt()) {
-        let corners = [v(-1.0, -1.0, height), v(1.0, 0.0, height), v(0.0, 1.0, height)].map(|p| p.as_vec3());
+        let corners = [v(-1.0, -1.0, height), v(1.0, 0.0, height), v(0.0, 1.0, height)].map(DVec3::as_vec3);
         let mesh = TriangleMesh {
             positions: corners.to_vec(),
             triangles: vec![[0, 1, 2]],
@@ -208,6 +208,7 @@ pub fn densities(trial: &Trial<'_>, wrong: &(dyn Fn(Vec3) -> f64 + Sync)) -> Vec
         count: trial.pick(200_000, 1_000_000, 100_000_000),
         seed: trial.seed.wrapping_add(12),
         cells: if trial.effort == crate::torture::Effort::Quick { 16 } else { 64 },
+        fine: 1024,
         level: 1e-4,
         tests: lights.len() as u32,
     };
@@ -249,7 +250,8 @@ pub fn unlike_lights() -> Vec<Spot> {
         Thing::Light(light, DAffine3::from_translation(v(aside, 0.0, height)))
     };
     // Radiance times 1e8, and a distance at which they bring nearly the same.
-    let (far, near) = ((1e4, 0.0, 1e8f32), (1.0, 0.0, 1.0f32));
+    // Beside each other: they hide what is behind them.
+    let (far, near) = ((1e4, 0.0, 1e8f32), (1.0, -1.5, 1.0f32));
     let rest: Vec<(f64, f64, f32)> = (0..8).map(|i| (2.0, 3.0 + f64::from(i), 1.0)).collect();
     let of = move |name: &str, lights: Vec<(f64, f64, f32)>, computed: bool| {
         let all = lights.clone();

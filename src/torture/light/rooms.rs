@@ -29,6 +29,8 @@ pub struct Square {
     pub computed: bool,
     /// Of the noise.
     pub seed: u32,
+    /// In each cell.
+    pub samples: u32,
 }
 
 /// Both pairs of squares that have closed form factors.
@@ -44,7 +46,7 @@ pub fn squares() -> [(&'static str, [DVec3; 3], f64); 2] {
     ]
 }
 
-/// The renderer's form factor of a square: the mean over 64 × 64 cells, a sample in each.
+/// The renderer's form factor of a square: the mean over 64 × 64 cells, some samples in each.
 #[must_use]
 pub fn form_factor(square: &Square) -> f64 {
     let settings = RenderSettings {
@@ -58,20 +60,20 @@ pub fn form_factor(square: &Square) -> f64 {
     stage.add_mesh(floor, Material::lambert(Vec3::splat(ALBEDO)), DAffine3::IDENTITY);
     stage.add(parallelogram(u, v, true), DAffine3::from_translation(corner + (u + v) * 0.5));
     stage.look(DVec3::new(0.5, 0.5, 0.5), DVec3::new(0.5, 0.5, 0.0), DVec3::Y, 1.0);
-    let (film, _) = stage.expose(1, || true);
+    let (film, _) = stage.expose(square.samples, || true);
     let pixels = reds(&film);
     pixels.iter().sum::<f64>() / pixels.len() as f64 / f64::from(ALBEDO)
 }
 
 /// What is right of many pictures' form factors.
 #[must_use]
-pub fn judge_form_factor(what: &str, factors: &[f64], exact: f64) -> Vec<Check> {
+pub fn judge_form_factor(what: &str, samples: u64, factors: &[f64], exact: f64) -> Vec<Check> {
     let estimate = Estimate::of(factors);
     // Where its edges are, of cells and of floats.
     let rounding = 64.0 * UNIT * exact;
     let beyond = ((estimate.mean - exact).abs() - rounding).max(0.0);
     let off = if beyond == 0.0 { 0.0 } else { beyond / estimate.sigma };
-    let samples = 4096 * factors.len() as u64;
+    let samples = samples * 4096 * factors.len() as u64;
     vec![
         Check::new(format!("{what}: standard errors off"), samples, "samples", off, SIGMAS),
         Check::new(format!("{what}: {SIGMAS} standard errors"), 1, "means", SIGMAS * estimate.sigma, 5e-4),
@@ -79,14 +81,15 @@ pub fn judge_form_factor(what: &str, factors: &[f64], exact: f64) -> Vec<Check> 
 }
 
 fn form_factors(trial: &Trial<'_>) -> Vec<Check> {
-    let pictures = trial.pick(16, 64, 24_000);
+    let (pictures, samples) = (trial.pick(16, 32, 384), trial.pick(32, 64, 64) as u32);
     let mut checks = Vec::new();
     for (name, light, exact) in squares() {
         for place in Place::ALL {
             for computed in [true, false] {
                 let seeds: Vec<u64> = (0..pictures).collect();
                 let picture = |i: u64| {
-                    form_factor(&Square { light, place, computed, seed: (trial.seed * pictures + i) as u32 })
+                    let seed = (trial.seed * pictures + i) as u32;
+                    form_factor(&Square { light, place, computed, seed, samples })
                 };
                 let factors: Vec<f64> =
                     seeds.into_par_iter().filter(|_| !trial.interrupted()).map(picture).collect();
@@ -95,7 +98,7 @@ fn form_factors(trial: &Trial<'_>) -> Vec<Check> {
                 }
                 let how = if computed { "computed" } else { "sampled" };
                 let what = format!("{name}, {}, {how}", place.name());
-                checks.extend(judge_form_factor(&what, &factors, exact));
+                checks.extend(judge_form_factor(&what, u64::from(samples), &factors, exact));
                 trial.tell("L12", what, 0.5);
             }
         }

@@ -67,16 +67,16 @@ fn sun(stage: &mut Stage, toward: DVec3) {
 
 /// Radiance along the meridian from the sun's side to the other, of a ball that the sun meets at 60 degrees to the eye.
 fn meridian(mesh: TriangleMesh, integrator: Integrator, place: Place) -> Vec<f64> {
-    let size = 601;
+    let (size, rows) = (601, 3);
     let shift = DVec3::splat(place.shift);
-    let mut stage = Stage::placed(settings(size, size, integrator, 1), place.scale, shift);
+    let mut stage = Stage::placed(settings(size, rows, integrator, 1), place.scale, shift);
     stage.add_mesh(mesh, Material::lambert(Vec3::ONE), HERE);
     sun(&mut stage, DVec3::new(60f64.to_radians().sin(), 0.0, 60f64.to_radians().cos()));
     stage.look(DVec3::new(0.001, 0.002, 3.0), DVec3::ZERO, DVec3::Y, 2.0);
     let (film, _) = stage.expose(4, || true);
     // Without the silhouette, and from where the sun stands straight above.
-    let row: Vec<f64> = film.row(size / 2).map(|pixel| pixel.mean().x).collect();
-    let row: Vec<f64> = row[20..row.len() - 20].iter().rev().copied().collect();
+    let row: Vec<f64> = film.row(rows / 2).map(|pixel| pixel.mean().x).collect();
+    let row: Vec<f64> = row[20..size as usize - 20].iter().rev().copied().collect();
     let brightest = row.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
     row[brightest..].to_vec()
 }

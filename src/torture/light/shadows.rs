@@ -83,7 +83,7 @@ pub fn shadows_of_a_line() -> Vec<Spot> {
 }
 
 fn edges(trial: &Trial<'_>, id: &'static str, h: f64) -> Vec<Check> {
-    let count = if trial.effort == Effort::Quick { 21 } else { 201 };
+    let count = if trial.effort == Effort::Quick { 11 } else { 201 };
     let plan = Plan { together: true, samples: [1 << 13, 1 << 15, 1 << 23], ..Plan::of(id) };
     measure(trial, plan, &penumbra(h, count), &|ask| ours(ask, &|| !trial.interrupted()))
 }

@@ -99,12 +99,10 @@ fn slopes(trial: &Trial<'_>) -> Vec<Check> {
     let wanted = |sampling, spot| match (sampling, spot) {
         (Sampling::Independent, _) => Slope::Within(-0.5, 0.02),
         (Sampling::Stratified, _) => Slope::Below(-0.48),
-        (Sampling::Shifted, 0) => Slope::Below(-0.9),
-        (Sampling::Shifted, _) => Slope::Below(-0.7),
-        (Sampling::Sobol, 0) => Slope::Below(-0.9),
-        (Sampling::Sobol, _) => Slope::Below(-0.7),
+        (Sampling::Shifted | Sampling::Sobol, 0) => Slope::Below(-0.9),
+        (Sampling::Shifted | Sampling::Sobol, _) => Slope::Below(-0.7),
     };
-    let seeds = trial.pick(4, 16, 512);
+    let seeds = trial.pick(2, 16, 512);
     let mut checks = Vec::new();
     for (i, (name, spot)) in spots.iter().enumerate() {
         for sampling in [Sampling::Independent, Sampling::Stratified, Sampling::Shifted, Sampling::Sobol] {
