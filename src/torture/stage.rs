@@ -122,6 +122,13 @@ impl Estimate {
         Self { mean, sigma: (variance / n).sqrt() }
     }
 
+    /// How many standard errors it is off what is exact, beyond what rounding may do. What is no number stays none.
+    #[must_use]
+    pub fn off(self, exact: f64, rounding: f64) -> f64 {
+        let beyond = (self.mean - exact).abs() - rounding;
+        if beyond <= 0.0 { 0.0 } else { beyond / self.sigma }
+    }
+
     /// Of so many times the same.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {

@@ -5,13 +5,15 @@ mod lights;
 mod numbers;
 mod shading;
 
-use penumbra::torture::{self, Check, Effort, Trial};
+use penumbra::torture::{self, Check, Effort, Step, Trial};
 use std::sync::atomic::AtomicBool;
 
 static INTERRUPT: AtomicBool = AtomicBool::new(false);
 
+fn silent(_: Step) {}
+
 fn trial() -> Trial<'static> {
-    Trial { effort: Effort::Quick, seed: 0, progress: &|_| {}, interrupt: &INTERRUPT }
+    Trial { effort: Effort::Quick, seed: 0, progress: &silent, interrupt: &INTERRUPT }
 }
 
 /// Panics unless all of a case's limits are kept.

@@ -135,7 +135,7 @@ impl Accumulator for Running {
 
 #[test]
 fn sums_in_single_precision_are_found() {
-    let checks = adding::<Single>(1 << 25, 0);
+    let checks = adding::<Single>(1 << 26, 0);
     for word in ["0.1", "ones", "numbers in"] {
         finds(word, &checks);
     }
@@ -187,7 +187,8 @@ fn stopping_early_is_found() {
     for seed in 0..200 {
         let (all, few) = (film(seed, 16), film(seed, EVEN));
         // Dark by chance is dark for ever.
-        let stopped = reds(&all).iter().zip(reds(&few)).map(|(all, few)| if few == 0.0 { 0.0 } else { *all });
+        let pairs = reds(&all).into_iter().zip(reds(&few));
+        let stopped = pairs.map(|(all, few)| if few == 0.0 { 0.0 } else { all });
         stopping.push(mean(&stopped.collect::<Vec<f64>>()));
         fair.push(mean(&reds(&adaptively(&stage, seed, 16))));
     }

@@ -203,7 +203,7 @@ fn thin_box() -> Spot {
         move |p| 2.0 * f64::from(rho) * oracle::line(v(-1.5, 0.0, 2.0), v(1.5, 0.0, 2.0), p, UP, Line::Sine);
     let mut spot = Spot::new("a box 0.001 thick", DVec3::ZERO, UP, exact).with(shining(mesh));
     if let Expected::Value { model, .. } = &mut spot.expected {
-        *model = 1e-2;
+        *model = 1e-3;
     }
     spot
 }

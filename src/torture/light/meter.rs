@@ -110,13 +110,12 @@ pub fn judge(what: &str, ask: &Ask, reading: &Reading, same: Option<&Reading>) -
                 checks.push(Check::none(what, count, "pixels", sampled));
             }
             if is_computed {
-                let off = reading.pixels.iter().map(|p| (p - exact).abs()).fold(0.0, nan_max);
+                let off = reading.pixels.iter().map(|p| (p - exact).abs()).fold(0.0, larger);
                 let what = format!("{what}: relative error, computed");
                 checks.push(Check::new(what, count, "pixels", off / unit, rounding / unit));
             } else {
                 let estimate = Estimate::of(&reading.pixels);
-                let beyond = ((estimate.mean - exact).abs() - rounding).max(0.0);
-                let sigmas = if beyond == 0.0 { 0.0 } else { beyond / estimate.sigma };
+                let sigmas = estimate.off(exact, rounding);
                 let off = format!("{what}: standard errors off");
                 checks.push(Check::new(off, reading.samples, "samples", sigmas, SIGMAS));
                 let bound = format!("{what}: {SIGMAS} standard errors, relative");
@@ -127,8 +126,9 @@ pub fn judge(what: &str, ask: &Ask, reading: &Reading, same: Option<&Reading>) -
     checks
 }
 
-/// The larger; what is no number is larger than any.
-fn nan_max(a: f64, b: f64) -> f64 {
+/// The larger; what is no number is larger than any (`f64::max` would lose it).
+#[must_use]
+pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 

@@ -2,7 +2,7 @@
 
 use super::chi_square::{chi_square, tail};
 use super::lamps::quads;
-use super::meter::{Ask, SIGMAS, ours};
+use super::meter::{Ask, SIGMAS, larger, ours};
 use super::shadows::penumbra;
 use super::spot::{Expected, Spot};
 use crate::torture::stage::Estimate;
@@ -63,7 +63,7 @@ fn nets(trial: &Trial<'_>) -> Vec<Check> {
 /// Of χ² tests, all together at a level of 1 in 10,000, the one that is furthest from passing.
 fn worst_tail(what: &str, each: u64, deviates: &[f64]) -> Check {
     let level = 1.0 - (1.0 - 1e-4f64).powf(1.0 / deviates.len() as f64);
-    let worst = deviates.iter().map(|z| -tail(*z).log10()).fold(0.0, f64::max);
+    let worst = deviates.iter().map(|z| -tail(*z).log10()).fold(0.0, larger);
     Check::new(
         format!("{what}: χ², −log₁₀ p"),
         each * deviates.len() as u64,
@@ -143,9 +143,7 @@ fn few_samples(trial: &Trial<'_>, spot: &Spot, samples: u32, sampling: Sampling,
 /// Whether independent estimates are right on average, but for single precision.
 #[must_use]
 pub fn unbiased(what: &str, samples: u64, estimates: &[f64], exact: f64) -> Check {
-    let estimate = Estimate::of(estimates);
-    let off = ((estimate.mean - exact).abs() - 3e-6 * exact).max(0.0);
-    let sigmas = if off == 0.0 { 0.0 } else { off / estimate.sigma };
+    let sigmas = Estimate::of(estimates).off(exact, 3e-6 * exact);
     let count = samples * estimates.len() as u64;
     Check::new(format!("{what}: standard errors off"), count, "samples", sigmas, SIGMAS)
 }

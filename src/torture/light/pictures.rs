@@ -70,8 +70,7 @@ pub fn adaptively(stage: &Stage, seed: u32, samples: u32) -> Film {
 #[must_use]
 pub fn bias(what: &str, samples: u64, means: &[f64], exact: f64) -> Vec<Check> {
     let estimate = Estimate::of(means);
-    let beyond = ((estimate.mean - exact).abs() - 3e-6 * exact).max(0.0);
-    let sigmas = if beyond == 0.0 { 0.0 } else { beyond / estimate.sigma };
+    let sigmas = estimate.off(exact, 3e-6 * exact);
     let bound = SIGMAS * estimate.sigma / exact;
     vec![
         Check::new(format!("{what}: standard errors off"), samples, "samples", sigmas, SIGMAS),
@@ -81,7 +80,7 @@ pub fn bias(what: &str, samples: u64, means: &[f64], exact: f64) -> Vec<Check> {
 
 fn adaptive(trial: &Trial<'_>) -> Vec<Check> {
     let (stage, exact) = (strip(), strip_in_closed_form());
-    let seeds = trial.pick(80, 1000, 100_000);
+    let seeds = trial.pick(160, 1000, 100_000);
     let mut checks = Vec::new();
     for samples in [8, 16, 64] {
         let means: Vec<f64> = (0..seeds)

@@ -2,7 +2,7 @@
 
 use super::chi_square::{Draws, Map, compare};
 use super::lamps::LIMIT;
-use super::meter::{Plan, measure, ours};
+use super::meter::{Plan, larger, measure, ours};
 use super::oracle;
 use super::rng::Rng;
 use super::spot::{Spot, Thing, shining};
@@ -221,9 +221,9 @@ pub fn densities(trial: &Trial<'_>, wrong: &(dyn Fn(Vec3) -> f64 + Sync)) -> Vec
             let sample = sampled.light.sample(sampled.from, Vec3::Z, rng.pair())?;
             // What a sample says is what a ray finds; at the very rim rounding may let the ray pass.
             let (said, found) = (f64::from(sample.pdf?), (sampled.density)(sample.wi));
-            if found > 0.0 {
+            if found != 0.0 {
                 asked += 1;
-                far_off = far_off.max((said / found - 1.0).abs());
+                far_off = larger(far_off, (said / found - 1.0).abs());
             }
             Some(sample.wi)
         };
@@ -338,7 +338,7 @@ fn solid_angles(trial: &Trial<'_>) -> Vec<Check> {
         }
         let exact = area / (distance * distance);
         let found = SphericalTriangle::new([at(DVec3::ZERO), at(b), at(c)]).map_or(0.0, |t| t.solid_angle);
-        worst = worst.max((found / exact - 1.0).abs());
+        worst = larger(worst, (found / exact - 1.0).abs());
     }
     vec![Check::new("solid angle of far triangles, relative", n, "triangles", worst, 1e-5)]
 }

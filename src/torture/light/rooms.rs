@@ -70,9 +70,7 @@ pub fn form_factor(square: &Square) -> f64 {
 pub fn judge_form_factor(what: &str, samples: u64, factors: &[f64], exact: f64) -> Vec<Check> {
     let estimate = Estimate::of(factors);
     // Where its edges are, of cells and of floats.
-    let rounding = 64.0 * UNIT * exact;
-    let beyond = ((estimate.mean - exact).abs() - rounding).max(0.0);
-    let off = if beyond == 0.0 { 0.0 } else { beyond / estimate.sigma };
+    let off = estimate.off(exact, 64.0 * UNIT * exact);
     let samples = samples * 4096 * factors.len() as u64;
     vec![
         Check::new(format!("{what}: standard errors off"), samples, "samples", off, SIGMAS),

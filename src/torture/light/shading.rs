@@ -1,5 +1,6 @@
 //! H1, H2, H4: normals of coarse, odd and mapped surfaces.
 
+use super::meter::larger;
 use super::pictures::differing;
 use super::rng::Rng;
 use crate::scene::{
@@ -87,7 +88,7 @@ pub fn judge_meridian(what: &str, shade: &[f64]) -> Vec<Check> {
     let most = shade.iter().copied().fold(0.0, f64::max);
     let steps = || shade.windows(2).map(|pair| (pair[1] - pair[0]) / most);
     let n = shade.len() as u64;
-    let (down, up) = (steps().fold(0.0f64, |m, s| m.max(-s)), steps().fold(0.0f64, f64::max));
+    let (down, up) = (steps().fold(0.0, |m, s| larger(m, -s)), steps().fold(0.0, larger));
     vec![
         Check::new(format!("{what}: largest step, of the most"), n, "pixels", down, 0.02),
         Check::new(format!("{what}: largest step the wrong way"), n, "pixels", up, 0.02),
@@ -274,8 +275,8 @@ fn carried(trial: &Trial<'_>) -> Vec<Check> {
                     let off = reds(&film)
                         .iter()
                         .map(|r| (r * std::f64::consts::PI - cosine).abs())
-                        .fold(0.0, f64::max);
-                    worst = worst.max(if off.is_nan() { f64::INFINITY } else { off });
+                        .fold(0.0, larger);
+                    worst = larger(worst, off);
                     tried += 64;
                 }
             }

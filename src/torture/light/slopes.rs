@@ -132,9 +132,7 @@ pub fn judge_long_run(what: &str, steps: &[(u64, Vec<f64>)], exact: f64) -> Vec<
         (pixels.iter().map(|p| (p / exact - 1.0).powi(2)).sum::<f64>() / pixels.len() as f64).sqrt()
     };
     for (samples, pixels) in steps {
-        let estimate = Estimate::of(pixels);
-        let beyond = ((estimate.mean - exact).abs() - 1e-6 * exact).max(0.0);
-        let off = if beyond == 0.0 { 0.0 } else { beyond / estimate.sigma };
+        let off = Estimate::of(pixels).off(exact, 1e-6 * exact);
         checks.push(Check::new(
             format!("{what}: drift, in standard errors"),
             *samples,

@@ -211,7 +211,7 @@ pub const S5: Case = Case {
     id: "S5",
     title: "10⁸ samples of a pixel add up, whatever their sizes",
     limit: "1e-12",
-    run: |trial| adding::<Pixel>(trial.pick(1 << 25, 100_000_000, 1_000_000_000) as u32, trial.seed),
+    run: |trial| adding::<Pixel>(trial.pick(1 << 26, 100_000_000, 1_000_000_000) as u32, trial.seed),
 };
 
 /// No numbers.

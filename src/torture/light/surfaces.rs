@@ -2,6 +2,7 @@
 
 use super::chi_square::{Draws, Map, compare};
 use super::kinds::{Seen, coat, ggx, glossy_kinds, layered, layered_kinds};
+use super::meter::larger;
 use super::rng::Rng;
 use crate::scene::{Glossy, Layers, Material};
 use crate::torture::{Case, Check, Trial};
@@ -123,7 +124,7 @@ fn one_surface(
     wrong: &dyn Fn(Vec3) -> f64,
 ) -> Vec<Check> {
     let seen = Seen::new(material, toward(degrees).as_vec3());
-    let mut off = 0.0f32;
+    let mut off = 0.0;
     let propose = |rng: &mut Rng| {
         let bsdf = seen.bsdf();
         let sample = bsdf.sample(rng.unit(), rng.pair(), Lobes::ALL)?;
@@ -132,7 +133,7 @@ fn one_surface(
         let [diffuse, glossy] = bsdf.eval(sample.wi);
         let value = diffuse + glossy;
         let beside = (sample.weight * pdf - value).abs().max_element() / value.max_element();
-        off = off.max(if sample.pdf == Some(pdf) { beside } else { f32::INFINITY });
+        off = larger(off, f64::from(if sample.pdf == Some(pdf) { beside } else { f32::INFINITY }));
         Some(sample.wi)
     };
     let density = |wi: Vec3| f64::from(seen.bsdf().pdf(wi, Lobes::ALL)) * wrong(wi);
@@ -148,7 +149,7 @@ fn one_surface(
         None => compare(&what, draws, propose, density, &by_height()),
     };
     let what = format!("{what}: weight beside value over density");
-    checks.push(Check::new(what, draws.count, "samples", f64::from(off), 1e-5));
+    checks.push(Check::new(what, draws.count, "samples", off, 1e-5));
     checks
 }
 
