@@ -19,6 +19,7 @@ pub mod mesh_light;
 pub mod noise;
 pub mod pass;
 pub mod quad;
+mod reuse;
 pub mod sampler;
 pub mod scene;
 pub mod settings;
