@@ -1,5 +1,6 @@
 //! Places where light arrives, and how much of it should.
 
+use super::meter::larger;
 use super::oracle;
 use crate::scene::{Light, Material, TriangleMesh, Visible};
 use crate::torture::Place;
@@ -182,7 +183,7 @@ impl Spot {
         // A film counts in multiples of 2⁻⁶⁰ of what leaves the receiver.
         let quantum = 2f64.powi(-61) * std::f64::consts::PI / f64::from(ALBEDO);
         let sums = ROUNDINGS * UNIT * condition(self.point);
-        Some(corners.fold(0.0, f64::max) + sums + quantum + model * here.abs())
+        Some(corners.fold(0.0, larger) + sums + quantum + model * here.abs())
     }
 
     /// Puts all of it on a stage.

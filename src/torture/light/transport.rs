@@ -25,6 +25,24 @@ fn room(material: Material, max_depth: u32, size: u32, place: Place, seed: u64) 
     stage
 }
 
+/// Pictures of one estimate each: pixels may share what their paths find, pictures do not.
+const PICTURES: u32 = 32;
+
+/// The means of so many pictures, of `samples` a pixel together.
+fn means(trial: &Trial<'_>, stage: &mut Stage, samples: u32) -> Vec<f64> {
+    stage.app.build();
+    let stage = &*stage;
+    let settings = *stage.scene().settings;
+    let mean = |i: u32| {
+        let settings =
+            RenderSettings { seed: settings.seed.wrapping_mul(PICTURES).wrapping_add(i), ..settings };
+        let (film, _) = stage.expose_with(&settings, (samples / PICTURES).max(1), || !trial.interrupted());
+        let pixels = reds(&film);
+        pixels.iter().sum::<f64>() / pixels.len() as f64
+    };
+    (0..PICTURES).into_par_iter().map(mean).collect()
+}
+
 /// Pixels that are all the same number, but for single precision.
 #[must_use]
 pub fn all_the_same(what: &str, pixels: &[f64], exact: f64, off: f64) -> Check {
@@ -32,7 +50,7 @@ pub fn all_the_same(what: &str, pixels: &[f64], exact: f64, off: f64) -> Check {
     Check::new(format!("{what}: relative error"), pixels.len() as u64, "pixels", worst, off)
 }
 
-/// Pixels that are that on average: offset in standard errors, and those.
+/// Independent estimates that are that on average: offset in standard errors, and those.
 #[must_use]
 pub fn on_average(what: &str, samples: u64, pixels: &[f64], exact: f64, model: f64) -> Vec<Check> {
     let estimate = Estimate::of(pixels);
@@ -49,7 +67,7 @@ pub fn on_average(what: &str, samples: u64, pixels: &[f64], exact: f64, model: f
     ]
 }
 
-/// Pixels that may on average be no more than that.
+/// Independent estimates that may on average be no more than that.
 #[must_use]
 pub fn no_more_than(what: &str, samples: u64, pixels: &[f64], most: f64) -> Check {
     let estimate = Estimate::of(pixels);
@@ -108,19 +126,14 @@ fn mirrors(trial: &Trial<'_>) -> Vec<Check> {
             if samples == 0 || k > 9 && place != Place::ORIGIN {
                 continue;
             }
-            let (film, _) =
-                room(mirror(), k as u32, size, place, trial.seed).expose(samples, || !trial.interrupted());
+            let mut stage = room(mirror(), k as u32, size, place, trial.seed);
+            let pictures = means(trial, &mut stage, samples);
             if trial.interrupted() {
                 return checks;
             }
             let tried = u64::from(samples * size * size);
-            checks.extend(on_average(
-                &format!("{k} bounces, {}", place.name()),
-                tried,
-                &reds(&film),
-                exact,
-                0.0,
-            ));
+            let what = format!("{k} bounces, {}", place.name());
+            checks.extend(on_average(&what, tried, &pictures, exact, 0.0));
             trial.tell("H8", place.name(), 0.5);
         }
     }
@@ -128,12 +141,12 @@ fn mirrors(trial: &Trial<'_>) -> Vec<Check> {
 }
 
 /// A white environment, a ball in it, and a picture that shows all of the ball and some environment.
-fn furnace(material: Material, max_depth: u32, samples: u32, place: Place) -> Vec<f64> {
+fn furnace(material: Material, max_depth: u32, place: Place) -> Stage {
     let mut stage = placed(settings(32, 32, Integrator::Path, max_depth), place);
     stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
     stage.add_mesh(ball(16), material, HERE);
     stage.look(DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO, DVec3::Y, 2.2);
-    reds(&stage.expose(samples, || true).0)
+    stage
 }
 
 fn furnaces(trial: &Trial<'_>) -> Vec<Check> {
@@ -156,19 +169,21 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
         ("glass", clear, 1000),
         ("mirror", Material::perfect_mirror(Vec3::ONE), 8),
     ] {
-        let pixels = furnace(material, depth, 64, place);
+        let pixels = reds(&furnace(material, depth, place).expose(64, || true).0);
         checks.push(all_the_same(&format!("white {name} ball, {}", place.name()), &pixels, 1.0, 1e-5));
     }
-    let samples = trial.pick(16, 256, 65_536) as u32;
+    let samples = trial.pick(32, 256, 65_536) as u32;
     for roughness in [0.1, 0.3, 0.5, 1.0] {
         let glossy = ggx(1.0, roughness);
-        let pixels = furnace(Material { glossy, ..white.clone() }, 8, samples, place);
+        let mut stage = furnace(Material { glossy, ..white.clone() }, 8, place);
+        let pixels = means(trial, &mut stage, samples);
         let what = format!("metal of roughness {roughness}, {}", place.name());
         checks.push(no_more_than(&what, u64::from(samples) * 1024, &pixels, 1.0));
     }
     for exponent in [0.0, 1.0, 10.0, 1000.0] {
         let glossy = Glossy::BlinnPhong { specular: Vec3::ONE, exponent, texture: None };
-        let pixels = furnace(Material { glossy, ..Material::lambert(Vec3::ZERO) }, 8, samples, place);
+        let mut stage = furnace(Material { glossy, ..Material::lambert(Vec3::ZERO) }, 8, place);
+        let pixels = means(trial, &mut stage, samples);
         let what = format!("Blinn-Phong of exponent {exponent}, {}", place.name());
         checks.push(no_more_than(&what, u64::from(samples) * 1024, &pixels, 1.0));
     }
@@ -180,12 +195,12 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
         let walls = Material { emission: Vec3::ONE, ..Material::lambert(Vec3::splat(albedo)) };
         let exact = 1.0 / (1.0 - f64::from(albedo));
         let samples = trial.pick(512, 512, 100_000) as u32 * more;
-        let (film, _) = room(walls, 1000, 32, place, trial.seed).expose(samples, || !trial.interrupted());
+        let pictures = means(trial, &mut room(walls, 1000, 32, place, trial.seed), samples);
         if trial.interrupted() {
             return Vec::new();
         }
         let what = format!("a shining room of albedo {albedo}, {}", place.name());
-        checks.extend(on_average(&what, u64::from(samples) * 1024, &reds(&film), exact, 0.0));
+        checks.extend(on_average(&what, u64::from(samples) * 1024, &pictures, exact, 0.0));
     }
     trial.tell("H9", place.name(), 0.5);
     checks
@@ -205,7 +220,7 @@ fn balls_from_inside(trial: &Trial<'_>) -> Vec<Check> {
             stage.add(Light::Point { intensity: Vec3::splat(std::f32::consts::PI) }, HERE);
         }
         stage.look_wide(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.5, 0.3, -0.6));
-        reds(&stage.expose(samples, || !trial.interrupted()).0)
+        means(trial, &mut stage, samples)
     };
     let mut checks = Vec::new();
     for (name, material, lit) in [("lit from its middle", half, true), ("that shines", shining, false)] {
