@@ -6,7 +6,7 @@ use penumbra::torture::light::lamps::{cut_by_the_horizon, quads, touching_the_fl
 use penumbra::torture::light::meter::{Ask, Meter, Plan, Reading, measure, ours};
 use penumbra::torture::light::oracle;
 use penumbra::torture::light::pictures::fireflies;
-use penumbra::torture::light::remedies::{choice, densities};
+use penumbra::torture::light::remedies::{choice, densities, solid_angles};
 use penumbra::torture::light::rng::Rng;
 use penumbra::torture::light::rooms::{awkward_places, judge_form_factor, squares};
 use penumbra::torture::light::shadows::penumbra;
@@ -207,4 +207,18 @@ fn choice_by_power_alone_is_found() {
     let by_power = choice("by power", &[1.0 - 1e-8, 1e-8], &[1.0, 1.0]);
     assert!(!by_power.holds(), "{by_power:?}");
     assert!(choice("half by power", &[0.75, 0.25], &[1.0, 1.0]).holds());
+}
+
+#[test]
+fn a_solid_angle_by_arc_cosines_is_found() {
+    // The excess of the angles over half a turn: nothing is left of it far away, even in double precision.
+    let by_excess = |corners: [DVec3; 3]| {
+        let [a, b, c] = corners.map(DVec3::normalize);
+        let angle = |a: DVec3, b: DVec3, c: DVec3| {
+            let (n, m) = (a.cross(b).normalize(), a.cross(c).normalize());
+            n.dot(m).clamp(-1.0, 1.0).acos()
+        };
+        angle(a, b, c) + angle(b, c, a) + angle(c, a, b) - std::f64::consts::PI
+    };
+    assert!(!solid_angles(1000, 1, by_excess).holds());
 }

@@ -1,13 +1,14 @@
 //! Surfaces, textures and transport that are a little wrong.
 
 use crate::{finds, trial};
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use penumbra::image::Display;
 use penumbra::scene::color::srgb_from_linear;
 use penumbra::scene::{Encoding, Filter, Texture};
 use penumbra::torture::Check;
+use penumbra::torture::light::meter::no_light;
 use penumbra::torture::light::shading::{faceted_meridian, judge_meridian};
-use penumbra::torture::light::surfaces::{all_surfaces, tilted_mirrors};
+use penumbra::torture::light::surfaces::{all_surfaces, is_fine, tilted_mirrors};
 use penumbra::torture::light::textures::{coordinates, decoding, tone_maps};
 use penumbra::torture::light::transport::{all_the_same, no_more_than, on_average};
 use penumbra::trace::texture::lookup;
@@ -88,4 +89,17 @@ fn lost_and_gained_energy_is_found() {
     finds("relative", &on_average("too noisy", 1, &[1.0, 2.0, 0.0, 1.0], 1.0, 0.0));
     assert!(no_more_than("fair", 1, &noisy(1.0), 1.0).holds());
     assert!(!no_more_than("gains", 1, &noisy(1.005), 1.0).holds());
+}
+
+#[test]
+fn what_is_no_light_is_found() {
+    assert!(no_light("fair", &[0.0, 1.0], false).holds() && no_light("fair", &[1e-30], true).holds());
+    for odd in [f64::NAN, f64::INFINITY, -1e-30] {
+        assert!(!no_light("odd", &[1.0, odd], false).holds());
+    }
+    assert!(!no_light("a black dot", &[1.0, 0.0], true).holds());
+    assert!(is_fine(Vec3::ONE, 0.0));
+    for odd in [f32::NAN, f32::INFINITY, -1e-30] {
+        assert!(!is_fine(Vec3::new(1.0, odd, 0.0), 1.0) && !is_fine(Vec3::ONE, odd));
+    }
 }

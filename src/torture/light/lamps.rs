@@ -123,10 +123,10 @@ pub fn balls() -> Vec<Spot> {
             ball(format!("{angle:.2} rad off the normal"), v(angle.sin(), 0.0, angle.cos()) * 2.0, 1.0)
         })
         .to_vec();
-    spots.extend(
-        [1e-2, 1e-4, 1e-6]
-            .map(|ratio| ball(format!("of {ratio:e} of its distance"), DVec3::Z * 100.0, 100.0 * ratio)),
-    );
+    spots.extend([1e-2, 1e-4, 1e-6].map(|ratio| {
+        let ball = ball(format!("of {ratio:e} of its distance"), DVec3::Z * 100.0, 100.0 * ratio);
+        Spot { bound: if ratio < 1e-3 { 1e-5 } else { ball.bound }, ..ball }
+    }));
     // Under the horizon, all of it.
     spots.push(Spot {
         expected: Expected::Dark,

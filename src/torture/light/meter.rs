@@ -71,8 +71,6 @@ pub fn ours(ask: &Ask, keep_going: &(dyn Fn() -> bool + Sync)) -> Reading {
 
 /// Standard errors that a mean may be off: two-sided p = 7e-6.
 pub const SIGMAS: f64 = 4.5;
-/// The largest relative bound: a test that accepts everything is no test.
-pub const BOUND: f64 = 1e-3;
 
 /// What is right of a reading. Of several, each by itself.
 #[must_use]
@@ -119,11 +117,19 @@ pub fn judge(what: &str, ask: &Ask, reading: &Reading, same: Option<&Reading>) -
                 let off = format!("{what}: standard errors off");
                 checks.push(Check::new(off, reading.samples, "samples", sigmas, SIGMAS));
                 let bound = format!("{what}: {SIGMAS} standard errors, relative");
-                checks.push(Check::new(bound, 1, "means", SIGMAS * estimate.sigma / unit, BOUND));
+                checks.push(Check::new(bound, 1, "means", SIGMAS * estimate.sigma / unit, ask.spot.bound));
             }
         }
     }
     checks
+}
+
+/// Pixels that are no light: no number, below 0, or black where all is lit.
+#[must_use]
+pub fn no_light(what: impl Into<String>, pixels: &[f64], all_lit: bool) -> Check {
+    let is_light = |p: &&f64| p.is_finite() && **p >= 0.0 && !(all_lit && **p == 0.0);
+    let count = pixels.len() as u64;
+    Check::none(what, count, "pixels", count - pixels.iter().filter(is_light).count() as u64)
 }
 
 /// The larger; what is no number is larger than any (`f64::max` would lose it).
@@ -207,7 +213,7 @@ fn one(
             return Vec::new();
         }
         let checks = judge(name, &ask, &reading, same.as_ref());
-        let too_wide = |check: &Check| check.limit == BOUND && !check.holds();
+        let too_wide = |check: &Check| check.unit == "means" && !check.holds();
         // No more than 16 million samples, or sixteen times as many as were meant to be.
         let most = (1 << 16).max(16 * plan.at_first(trial.effort) / pixels) as u32;
         if !checks.iter().any(too_wide) || ask.samples >= most {

@@ -1,6 +1,6 @@
 //! H1, H2, H4: normals of coarse, odd and mapped surfaces.
 
-use super::meter::larger;
+use super::meter::{larger, no_light};
 use super::pictures::differing;
 use super::rng::Rng;
 use crate::scene::{
@@ -197,14 +197,8 @@ fn odd_normals(trial: &Trial<'_>) -> Vec<Check> {
             stage.add_mesh(mesh, material.clone(), HERE);
             stage.look(DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO, DVec3::Y, 2.2);
             let (film, _) = stage.expose(16, || true);
-            let pixels = reds(&film);
-            let wrong = pixels.iter().filter(|r| !(r.is_finite() && **r > 0.0)).count() as u64;
-            checks.push(Check::none(
-                format!("{name}, {surface}: black or no number"),
-                64 * 64,
-                "pixels",
-                wrong,
-            ));
+            let what = format!("{name}, {surface}: black or no number");
+            checks.push(no_light(what, &reds(&film), true));
             checks.push(Check::none(
                 format!("{name}, {surface}: dropped"),
                 64 * 64 * 16,
@@ -303,8 +297,7 @@ fn odd_maps(trial: &Trial<'_>) -> Vec<Check> {
         let mut stage = mapped(texel, rng.unit() * 4.0, tangent, uvs, HERE, DVec3::new(0.9, 0.6, 3.0));
         stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
         let (film, _) = stage.expose(16, || true);
-        let wrong = reds(&film).iter().filter(|r| !(r.is_finite() && **r > 0.0)).count() as u64;
-        (wrong, film.dropped())
+        (no_light("", &reds(&film), true).ours as u64, film.dropped())
     };
     let (wrong, dropped) = (0..count)
         .into_par_iter()

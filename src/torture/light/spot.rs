@@ -8,6 +8,9 @@ use crate::torture::stage::{Stage, quad};
 use glam::{DAffine3, DVec3, Vec3};
 use std::sync::Arc;
 
+/// See [`Spot::bound`].
+pub const BOUND: f64 = 1e-3;
+
 /// Of all receivers.
 pub const ALBEDO: f32 = 0.8;
 
@@ -42,6 +45,8 @@ pub struct Spot {
     pub expected: Expected,
     /// Whether it is computed, not sampled, unless somebody wants it to be sampled.
     pub computed: bool,
+    /// The largest that 4.5 standard errors may be of it: a test that accepts everything is no test.
+    pub bound: f64,
 }
 
 /// Something to put on the stage.
@@ -102,6 +107,7 @@ impl Spot {
             things: Vec::new(),
             expected,
             computed: false,
+            bound: BOUND,
         }
     }
 

@@ -179,6 +179,12 @@ pub fn all_surfaces(trial: &Trial<'_>, wrong: &(dyn Fn(Vec3) -> f64 + Sync)) -> 
     jobs.par_iter().flat_map_iter(of).collect()
 }
 
+/// Whether a surface may say so: a value and a density, both numbers and not below 0.
+#[must_use]
+pub fn is_fine(value: Vec3, pdf: f32) -> bool {
+    value.is_finite() && value.min_element() >= 0.0 && pdf.is_finite() && pdf >= 0.0
+}
+
 /// Roughness and angles at which formulas divide by nothing.
 fn limits_of_formulas(trial: &Trial<'_>) -> Vec<Check> {
     let none = Layers::default;
@@ -208,9 +214,7 @@ fn limits_of_formulas(trial: &Trial<'_>) -> Vec<Check> {
             let is_odd = |wi: Vec3| {
                 let [a, b] = bsdf.eval(wi);
                 let pdf = bsdf.pdf(wi, Lobes::ALL);
-                let good =
-                    (a + b).is_finite() && (a + b).min_element() >= 0.0 && pdf.is_finite() && pdf >= 0.0;
-                u64::from(!good)
+                u64::from(!is_fine(a + b, pdf))
             };
             for z in heights {
                 let across = (1.0 - z * z).max(0.0).sqrt();
@@ -223,10 +227,8 @@ fn limits_of_formulas(trial: &Trial<'_>) -> Vec<Check> {
                 let mut end = || [rng.unit(), 0.0, 1.0 - f32::EPSILON / 2.0][rng.bits() as usize % 3];
                 let (choice, u) = (end(), Vec2::new(end(), end()));
                 if let Some(sample) = bsdf.sample(choice, u, Lobes::ALL) {
-                    let fine = sample.weight.is_finite()
-                        && sample.weight.min_element() >= 0.0
-                        && (sample.wi.length() - 1.0).abs() < 1e-3
-                        && sample.pdf.is_none_or(|pdf| pdf > 0.0 && pdf.is_finite());
+                    let unit = (sample.wi.length() - 1.0).abs() < 1e-3;
+                    let fine = unit && is_fine(sample.weight, sample.pdf.unwrap_or(1.0));
                     odd += u64::from(!fine);
                 }
                 tried += 2;

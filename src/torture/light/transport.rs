@@ -76,19 +76,20 @@ pub fn no_more_than(what: &str, samples: u64, pixels: &[f64], most: f64) -> Chec
 }
 
 /// A thousand veils that hide nothing, two of them twice in one place, before a wall and before a light.
-fn veils(material: Material) -> [Film; 2] {
+fn veils(material: Material, place: Place) -> [Film; 2] {
     [0, 1000].map(|count| {
-        let mut stage = Stage::new(settings(32, 32, Integrator::Direct, 2));
+        let mut stage = placed(settings(32, 32, Integrator::Direct, 2), place);
         stage.add_mesh(
             quad(Vec3::new(-2.0, -2.0, 0.0), Vec3::X * 4.0, Vec3::Y * 4.0),
             Material::default(),
             HERE,
         );
-        let corner = |z: f32| Vec3::new(-3.0, -3.0, z);
+        // No larger than the wall, for the sake of one render space.
+        let corner = |z: f32| Vec3::new(-1.9, -1.9, z);
         for i in 0..count {
             // Between the wall and the eye; some in one place.
             let z = 0.5 + 0.001 * (i / 2 * 2).max(10) as f32;
-            stage.add_mesh(quad(corner(z), Vec3::X * 6.0, Vec3::Y * 6.0), material.clone(), HERE);
+            stage.add_mesh(quad(corner(z), Vec3::X * 3.8, Vec3::Y * 3.8), material.clone(), HERE);
         }
         let light = Light::Sphere { radius: 0.3, radiance: Vec3::splat(5.0) };
         stage.add(light, DAffine3::from_translation(DVec3::new(1.0, 0.0, 1.3)));
@@ -99,11 +100,12 @@ fn veils(material: Material) -> [Film; 2] {
 
 fn transparent(_: &Trial<'_>) -> Vec<Check> {
     let veil = |alpha, opacity| Material { alpha, opacity, double_sided: true, ..Material::default() };
-    [("masked", veil(Alpha::Mask(0.5), 0.25)), ("blended", veil(Alpha::Blend, 0.0))]
-        .into_par_iter()
-        .map(|(name, material)| {
-            let [bare, veiled] = veils(material);
-            differing(&format!("behind 1,000 {name} quads"), &veiled, &bare)
+    let kinds = [("masked", veil(Alpha::Mask(0.5), 0.25)), ("blended", veil(Alpha::Blend, 0.0))];
+    let jobs: Vec<_> = kinds.iter().flat_map(|kind| Place::ALL.map(|place| (kind, place))).collect();
+    jobs.into_par_iter()
+        .map(|((name, material), place)| {
+            let [bare, veiled] = veils(material.clone(), place);
+            differing(&format!("behind 1,000 {name} quads, {}", place.name()), &veiled, &bare)
         })
         .collect()
 }
