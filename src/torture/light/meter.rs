@@ -138,6 +138,13 @@ pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
+/// Where cases are tried: everywhere; in a hurry at the origin, far away, and small.
+#[must_use]
+pub fn places(effort: Effort) -> Vec<Place> {
+    let in_a_hurry = |place: &Place| place.shift == 0.0 && place.scale <= 1.0 || place.shift > 1e4;
+    Place::ALL.into_iter().filter(|place| effort != Effort::Quick || in_a_hurry(place)).collect()
+}
+
 /// How a list of spots is tried.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
@@ -166,9 +173,11 @@ impl Plan {
 /// Measures all spots at all places, sampled and, where that is possible, computed.
 pub fn measure(trial: &Trial<'_>, plan: Plan, spots: &[Spot], meter: &Meter) -> Vec<Check> {
     let modes = |spot: &Spot| if spot.computed { &[true, false][..] } else { &[false] };
+    let mut here = places(trial.effort);
+    here.retain(|place| plan.places.contains(place));
     let jobs: Vec<(&Spot, Place, bool)> = spots
         .iter()
-        .flat_map(|spot| plan.places.iter().map(move |place| (spot, *place)))
+        .flat_map(|spot| here.iter().map(move |place| (spot, *place)))
         .flat_map(|(spot, place)| modes(spot).iter().map(move |computed| (spot, place, *computed)))
         .collect();
     let (done, all) = (AtomicUsize::new(0), jobs.len());

@@ -1,7 +1,7 @@
 //! L12 and L13: whole squares, and awkward places.
 
 use super::lamps::{LIMIT, quads};
-use super::meter::{Plan, SIGMAS, measure, ours, worst_of_each};
+use super::meter::{Plan, SIGMAS, measure, ours, places, worst_of_each};
 use super::oracle;
 use super::spot::{ALBEDO, Expected, Spot, Thing, UNIT, opaque, panel, parallelogram, shining};
 use crate::scene::{Light, Material, TriangleMesh};
@@ -82,7 +82,7 @@ fn form_factors(trial: &Trial<'_>) -> Vec<Check> {
     let (pictures, samples) = (trial.pick(16, 32, 384), trial.pick(32, 64, 64) as u32);
     let mut checks = Vec::new();
     for (name, light, exact) in squares() {
-        for place in Place::ALL {
+        for place in places(trial.effort) {
             for computed in [true, false] {
                 let seeds: Vec<u64> = (0..pictures).collect();
                 let picture = |i: u64| {

@@ -1,6 +1,6 @@
 //! H1, H2, H4: normals of coarse, odd and mapped surfaces.
 
-use super::meter::{larger, no_light};
+use super::meter::{larger, no_light, places};
 use super::pictures::differing;
 use super::rng::Rng;
 use crate::scene::{
@@ -95,9 +95,9 @@ pub fn judge_meridian(what: &str, shade: &[f64]) -> Vec<Check> {
     ]
 }
 
-fn terminator(_: &Trial<'_>) -> Vec<Check> {
+fn terminator(trial: &Trial<'_>) -> Vec<Check> {
     let mut checks = Vec::new();
-    for place in Place::ALL {
+    for place in places(trial.effort) {
         for (name, mesh) in [("80 facets", icosphere()), ("168 facets", ball(8))] {
             for integrator in [Integrator::Direct, Integrator::Path] {
                 let shade = meridian(smooth(mesh.clone()), integrator, place);
