@@ -12,7 +12,7 @@ use penumbra::bvh::{Blas, Hit, Isa, Ray};
 use penumbra::scene::{Instance, Light, Material, Mesh};
 use penumbra::trace::{Film, Integrator};
 use rayon::prelude::*;
-use stage::{Stage, cube, quad, settings};
+use stage::{Frames as _, Stage, cube, quad, settings};
 use std::sync::Arc;
 
 #[test]

@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::{FrameBudget, FrameStats};
 use penumbra::scene::{Alpha, Glass, Glossy, Light, Material};
 use penumbra::trace::{Film, Integrator};
-use stage::{Stage, ball, quad, settings};
+use stage::{Frames as _, Stage, ball, quad, settings};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 

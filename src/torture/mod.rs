@@ -6,8 +6,9 @@
 //! was measured.
 
 mod geometry;
-mod light;
+pub mod light;
 mod place;
+pub mod stage;
 mod table;
 mod trial;
 

@@ -85,11 +85,18 @@ pub struct Arrivals {
     pub target: Rows,
     /// That is all it brings: nothing is left to be tested.
     pub certain: [bool; LANES],
+    /// The light is so near that this sample will not do.
+    pub near: [bool; LANES],
 }
 
 impl Default for Arrivals {
     fn default() -> Self {
-        Self { contribution: Rows::blank(), target: Rows::blank(), certain: [false; LANES] }
+        Self {
+            contribution: Rows::blank(),
+            target: Rows::blank(),
+            certain: [false; LANES],
+            near: [false; LANES],
+        }
     }
 }
 
@@ -175,7 +182,7 @@ impl Job for FindPoints<'_> {
     }
 }
 
-/// One sample of a parallelogram light for each point that is not `certain` yet.
+/// One sample of a parallelogram light for each point that is not `certain` yet; those that it is `near` need another.
 pub struct SampleQuad<'a> {
     /// The points.
     pub block: &'a Block,
@@ -225,6 +232,7 @@ impl Job for SampleQuad<'_> {
             let brought = if lit { brought } else { Vec3::ZERO };
             out.contribution.set(i, if out.certain[i] { out.contribution.get(i) } else { brought });
             out.target.set(i, offset(on_light, error_of(on_light), facing));
+            out.near[i] = quad.is_near(point) & !out.certain[i];
         }
     }
 }

@@ -16,7 +16,7 @@ use super::shape_light::{Shape, ShapeLight};
 use super::sightlines::{Sightlines, Window};
 use super::surface::Interaction;
 use super::visible::{HIDDEN, Reach, irradiance};
-use super::{Integrator, TraceScene};
+use super::{Integrator, TraceScene, spherical};
 use crate::bvh::{Hit, Ray};
 use glam::{UVec2, Vec3};
 use std::f32::consts::PI;
@@ -132,7 +132,36 @@ fn arrive_from_quad(
         let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
         let shared = scene.settings.integrator == Integrator::Path;
         isa.run(SampleQuad { block, quad, radiance, two_sided, dimension, shared, out });
+        for i in 0..block.count {
+            if out.near[i] {
+                sample_near(block, i, shape, dimension, shared, out);
+            }
+        }
     }
+}
+
+/// A sample of a light that is near one point.
+fn sample_near(
+    block: &Block,
+    i: usize,
+    shape: &ShapeLight,
+    dimension: u32,
+    shared: bool,
+    out: &mut Arrivals,
+) {
+    out.contribution.set(i, Vec3::ZERO);
+    let normal = block.normal.get(i);
+    let random = block.samplers.get(i).pair(dimension);
+    let Some(sample) = shape.sample(block.position.get(i), normal, random) else { return };
+    let (Some(pdf), Some(target)) = (sample.pdf, sample.target) else { return };
+    let cosine = normal.dot(sample.wi);
+    if cosine <= 0.0 || block.geometric_normal.get(i).dot(sample.wi) <= 0.0 {
+        return;
+    }
+    let weight = if shared { power_heuristic(pdf, cosine / PI) } else { 1.0 };
+    let brought = block.throughput.get(i) * sample.radiance * (cosine * weight / (PI * pdf));
+    out.contribution.set(i, brought);
+    out.target.set(i, target);
 }
 
 /// For each point of a block which of the known blockers may hide some of a light; `None` where they are not known.
@@ -175,14 +204,16 @@ fn seen_past(
     which: u32,
 ) -> Option<f32> {
     let point = block.position.get(i);
-    if which == HIDDEN || !shape.two_sided && (point - quad.corner).dot(quad.normal) <= 0.0 {
+    let height = (point - quad.corner).dot(quad.normal);
+    if which == HIDDEN || height == 0.0 || !shape.two_sided && height < 0.0 {
         return Some(0.0);
     }
+    let normals = [block.normal.get(i), block.geometric_normal.get(i)];
     if !quad.is_large(point) {
-        return None;
+        return (which == 0).then(|| spherical::irradiance(quad, point, normals) as f32);
     }
     let blockers = sightlines.blockers(block.known[i]?, light)?;
-    irradiance(quad, point, [block.normal.get(i), block.geometric_normal.get(i)], blockers, which)
+    irradiance(quad, point, normals, blockers, which)
 }
 
 /// Where a path has arrived, as others see it.

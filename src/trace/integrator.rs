@@ -314,7 +314,7 @@ impl Batch {
                     let distance2 = (at.position - path.ray.origin).length_squared();
                     let cos = at.geometric_normal.dot(path.ray.direction).abs();
                     let pdf = match scene.lights.get(light) {
-                        FlatLight::Mesh(mesh) => mesh.pdf(hit.triangle, distance2, cos),
+                        FlatLight::Mesh(mesh) => mesh.pdf(hit.triangle, path.ray.origin, distance2, cos),
                         _ => 0.0,
                     };
                     self.collect(scene, path, light, emission, pdf);

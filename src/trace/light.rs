@@ -187,13 +187,27 @@ pub(super) fn sample_flat(
     radiance: Vec3,
 ) -> Option<LightSample> {
     let (wi, distance2) = direction(point, position)?;
+    let cos = normal.dot(wi).abs();
+    sample_at(point, position, normal, distance2 / (area * cos), two_sided, radiance)
+}
+
+/// A sample of this density in solid angle at a place of a flat light.
+pub(super) fn sample_at(
+    point: Vec3,
+    position: Vec3,
+    normal: Vec3,
+    pdf: f32,
+    two_sided: bool,
+    radiance: Vec3,
+) -> Option<LightSample> {
+    let (wi, _) = direction(point, position)?;
     let cos = -normal.dot(wi);
     if !(cos > 0.0 || two_sided && cos < 0.0) {
         return None;
     }
     let facing = if cos > 0.0 { normal } else { -normal };
     let target = offset(position, error_of(position), facing);
-    Some(LightSample::new(wi, Some(target), radiance, Some(distance2 / (area * cos.abs()))))
+    Some(LightSample::new(wi, Some(target), radiance, Some(pdf)))
 }
 
 /// Bound on the rounding error of a point computed on a light.

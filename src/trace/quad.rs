@@ -122,6 +122,22 @@ impl Quad {
         (first > 0.0) & (first + by_u > 0.0) & (first + by_v > 0.0) & (first + by_u + by_v > 0.0)
     }
 
+    /// Whether it is so near that places are not sampled by what they bring, but evenly by solid angle: nearer than a quarter
+    /// of its longer edge. (There the corners say little about the middle; evenly by area, what is right above would have
+    /// 1.3 times the variance.)
+    #[inline(always)]
+    #[must_use]
+    pub fn is_near(&self, point: Vec3) -> bool {
+        let d = point - self.corner;
+        let inverse = 1.0 / self.area;
+        let a = d.cross(self.v).dot(self.normal) * inverse;
+        let b = self.u.cross(d).dot(self.normal) * inverse;
+        let a = greater(lesser(a, 1.0), 0.0);
+        let b = greater(lesser(b, 1.0), 0.0);
+        let off = d - self.u * a - self.v * b;
+        16.0 * off.length_squared() < greater(self.u.length_squared(), self.v.length_squared())
+    }
+
     /// Whether it looks so large that rounding leaves 16 bits of [`Quad::irradiance`] at least. And it is not so near that
     /// the angle of an edge comes close to half a turn.
     #[inline(always)]

@@ -1,7 +1,8 @@
 //! Area lights with a shape of their own: sampled like all lights, and solid to rays.
 
-use super::light::{LightSample, error_of, sample_flat};
+use super::light::{LightSample, error_of, sample_at, sample_flat};
 use super::quad::Quad;
+use super::spherical::{SphericalQuad, meet, weights};
 use super::warp::{cone, cone_pdf, offset, uniform_sphere};
 use crate::bvh::{Aabb, Ray};
 use glam::{DVec3, Vec2, Vec3};
@@ -61,6 +62,14 @@ impl ShapeLight {
     /// A direction toward it from `point` with `normal`; see [`super::light::FlatLight::sample`].
     pub(super) fn sample(&self, point: Vec3, normal: Vec3, u: Vec2) -> Option<LightSample> {
         match &self.shape {
+            Shape::Parallelogram(quad) if quad.is_near(point) => {
+                let seen = SphericalQuad::new(quad, point)?;
+                let corners = quad.corners().map(Vec3::as_dvec3);
+                let position = meet(&corners, point, seen.sample(u)?)?;
+                let place = weights(corners[0], quad.u.as_dvec3(), quad.v.as_dvec3(), position);
+                let (pdf, radiance) = ((1.0 / seen.solid_angle) as f32, self.radiance_at(place.into()));
+                sample_at(point, position.as_vec3(), self.normal, pdf, self.two_sided, radiance)
+            }
             Shape::Parallelogram(quad) => {
                 let place = quad.brightness(point, normal).sample(u);
                 // Also where a corner is at the very point.
@@ -108,6 +117,9 @@ impl ShapeLight {
             Shape::Sphere { center, radius } => {
                 let sin2 = radius * radius / center.distance_squared(ray.origin);
                 if sin2 < 1.0 { cone_pdf(sin2) } else { 0.25 / PI }
+            }
+            Shape::Parallelogram(quad) if quad.is_near(ray.origin) => {
+                SphericalQuad::new(quad, ray.origin).map_or(0.0, |seen| (1.0 / seen.solid_angle) as f32)
             }
             shape => {
                 let density = match shape {

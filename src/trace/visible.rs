@@ -35,16 +35,27 @@ impl Blocker {
     /// if nothing is.
     #[must_use]
     pub fn new(triangle: &[Vec3; 3], on: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
-        let mut piece = Piece { count: 3, ..Piece::EMPTY };
-        piece.corners[..3].copy_from_slice(&triangle.map(|p| p - on));
-        if !piece.corners[..3].iter().any(|p| normal.dot(*p) > tolerance) {
+        // In double precision, and corners that stay keep all their digits: a thousandth above the floor they count.
+        let height = |p: Vec3| normal.as_dvec3().dot(p.as_dvec3() - on.as_dvec3());
+        if !triangle.iter().any(|p| height(*p) > f64::from(tolerance)) {
             return None;
         }
-        let above = piece.inside(normal);
-        let mut corners = [Vec3::ZERO; 4];
-        let count = above.count.min(4);
-        for (to, from) in corners.iter_mut().zip(&above.corners[..count]) {
-            *to = *from + on;
+        let (mut corners, mut count) = ([Vec3::ZERO; 4], 0);
+        let mut push = |p: Vec3| {
+            if count < corners.len() {
+                corners[count] = p;
+                count += 1;
+            }
+        };
+        for i in 0..3 {
+            let (here, next) = (triangle[i], triangle[(i + 1) % 3]);
+            let (above, above_next) = (height(here), height(next));
+            if above > 0.0 {
+                push(here);
+            }
+            if (above > 0.0) != (above_next > 0.0) {
+                push(here.as_dvec3().lerp(next.as_dvec3(), above / (above - above_next)).as_vec3());
+            }
         }
         (count > 2).then_some(Self { corners, count })
     }

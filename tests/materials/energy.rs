@@ -1,10 +1,12 @@
 //! White furnaces, and that light goes both ways alike.
 
 use crate::geometry::Rng;
-use crate::kinds::{Seen, body, brushed, coat, ggx, glossy_kinds, layered, layered_kinds, pane, sheen};
 use crate::stage::Estimate;
 use glam::Vec3;
 use penumbra::scene::{Layers, Material};
+use penumbra::torture::light::kinds::{
+    Seen, body, brushed, coat, ggx, glossy_kinds, layered, layered_kinds, pane, sheen,
+};
 use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::bsdf::albedo::Reflected;
 

@@ -6,16 +6,9 @@
 )]
 #![allow(clippy::duplicate_mod, reason = "several of the modules below use the same random numbers")]
 
-#[path = "../support/alone.rs"]
-mod alone;
-#[path = "../support/chi_square.rs"]
-mod chi_square;
 mod energy;
 #[path = "../support/geometry.rs"]
 mod geometry;
-mod kinds;
 mod normals;
-mod samplers;
 #[path = "../support/stage.rs"]
 mod stage;
-mod terminator;

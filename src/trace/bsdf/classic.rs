@@ -127,5 +127,6 @@ impl Classic {
 /// (n + 2)(n + 4) / (8 π (2^(−n/2) + n)), F. Giesen, "Derivation of Phong and Blinn-Phong normalization
 /// factors", 2009.
 fn phong_normalization(exponent: f32) -> f32 {
-    (exponent + 2.0) * (exponent + 4.0) / (8.0 * PI * ((-0.5 * exponent).exp2() + exponent))
+    // The quotient first: squares of exponents overflow.
+    (exponent + 2.0) / (8.0 * PI) * ((exponent + 4.0) / ((-0.5 * exponent).exp2() + exponent))
 }

@@ -1,12 +1,12 @@
 //! The kinds of surfaces that are judged, each as a point of a floor whose normal is +Z and whose tangent is +X.
 
-use crate::stage::{Stage, settings};
+use crate::scene::{Anisotropy, Body, Clearcoat, Glossy, Layers, Material, Sheen, Transmission};
+use crate::torture::stage::{Stage, settings};
+use crate::trace::Integrator;
+use crate::trace::bsdf::{Bsdf, Passed};
+use crate::trace::scene::Surface;
+use crate::trace::surface::Interaction;
 use glam::{Vec2, Vec3, Vec4};
-use penumbra::scene::{Anisotropy, Body, Clearcoat, Glossy, Layers, Material, Sheen, Transmission};
-use penumbra::trace::Integrator;
-use penumbra::trace::bsdf::{Bsdf, Passed};
-use penumbra::trace::scene::Surface;
-use penumbra::trace::surface::Interaction;
 use std::sync::Arc;
 
 /// A material seen from one direction.
@@ -17,14 +17,17 @@ pub struct Seen {
 }
 
 impl Seen {
+    /// From outside, toward `wo`.
+    #[must_use]
     pub fn new(material: &Material, wo: Vec3) -> Self {
         Self::from_side(material, wo, true)
     }
 
     /// The floor's normal faces the eye in any case; `front` says whether that is the outside.
+    #[must_use]
     pub fn from_side(material: &Material, wo: Vec3, front: bool) -> Self {
         let mut stage = Stage::new(settings(1, 1, Integrator::Path, 1));
-        stage.trace(1);
+        stage.app.build();
         let layers = material.layers.as_ref().map(|layers| Box::new(layers.renamed(|_| None)));
         let has_body = |layers: &Layers<_>| layers.transmission.as_ref().is_some_and(|t| t.body.is_some());
         let body = layers.as_deref().filter(|layers| has_body(layers));
@@ -46,42 +49,58 @@ impl Seen {
         Self { stage, surface, at }
     }
 
+    /// The lobes there.
+    #[must_use]
     pub fn bsdf(&self) -> Bsdf {
         Bsdf::new(&self.stage.scene(), &self.surface, &self.at)
     }
 }
 
+/// Microfacets.
+#[must_use]
 pub fn ggx(metallic: f32, roughness: f32) -> Glossy {
     Glossy::Ggx { metallic, roughness, texture: None }
 }
 
 /// Metallic-roughness of this albedo with these layers.
+#[must_use]
 pub fn layered(albedo: f32, metallic: f32, roughness: f32, layers: Layers) -> Material {
     let glossy = ggx(metallic, roughness);
     Material { glossy, layers: Some(Box::new(layers)), ..Material::lambert(Vec3::splat(albedo)) }
 }
 
+/// Varnish.
+#[must_use]
 pub fn coat(roughness: f32) -> Option<Clearcoat> {
     Some(Clearcoat { factor: 1.0, texture: None, roughness, roughness_texture: None, normal_map: None })
 }
 
+/// Velvet.
+#[must_use]
 pub fn sheen(color: f32, roughness: f32) -> Option<Sheen> {
     Some(Sheen { color: Vec3::splat(color), color_texture: None, roughness, roughness_texture: None })
 }
 
+/// Strokes.
+#[must_use]
 pub fn brushed(strength: f32) -> Option<Anisotropy> {
     Some(Anisotropy { strength, rotation: 0.0, texture: None })
 }
 
+/// Glass.
+#[must_use]
 pub fn body(factor: f32) -> Option<Transmission> {
     Some(Transmission { factor, texture: None, body: Some(Body { absorption: Vec3::ZERO }) })
 }
 
+/// A thin sheet.
+#[must_use]
 pub fn pane(factor: f32) -> Option<Transmission> {
     Some(Transmission { factor, texture: None, body: None })
 }
 
 /// With the tangent of the typical angle between the normal and the half vector.
+#[must_use]
 pub fn glossy_kinds() -> Vec<(&'static str, Material, f64)> {
     let phong = |exponent| Glossy::BlinnPhong { specular: Vec3::splat(0.7), exponent, texture: None };
     [
@@ -102,6 +121,7 @@ pub fn glossy_kinds() -> Vec<(&'static str, Material, f64)> {
 }
 
 /// All with lobes wide enough for cells of a sphere.
+#[must_use]
 pub fn layered_kinds() -> Vec<(&'static str, Material)> {
     let none = Layers::default;
     vec![

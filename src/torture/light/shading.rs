@@ -1,0 +1,335 @@
+//! H1, H2, H4: normals of coarse, odd and mapped surfaces.
+
+use super::meter::{larger, no_light, places};
+use super::pictures::differing;
+use super::rng::Rng;
+use crate::scene::{
+    Encoding, Filter, Glossy, Light, Material, NormalMap, Texels, Texture, TriangleMesh, Wrap,
+};
+use crate::torture::stage::{Stage, ball, cube, quad, reds, settings};
+use crate::torture::{Case, Check, Place, Trial};
+use crate::trace::Integrator;
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+const HERE: DAffine3 = DAffine3::IDENTITY;
+
+/// With the normals of the ball around its middle.
+fn smooth(mut mesh: TriangleMesh) -> TriangleMesh {
+    mesh.normals = mesh.positions.iter().map(|p| p.normalize()).collect();
+    mesh
+}
+
+/// An icosahedron, each of its faces in four: 80 facets.
+fn icosphere() -> TriangleMesh {
+    let g = 0.5 * (1.0 + 5f32.sqrt());
+    let mut positions: Vec<Vec3> = Vec::new();
+    for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
+        positions.extend([Vec3::new(0.0, a, b), Vec3::new(a, b, 0.0), Vec3::new(b, 0.0, a)]);
+    }
+    // Faces are all triples at the least distance, their front outside.
+    let near = |a: usize, b: usize| positions[a].distance(positions[b]) < 2.1;
+    let mut faces = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if near(a, b) && near(b, c) && near(c, a) {
+                    let out =
+                        (positions[b] - positions[a]).cross(positions[c] - positions[a]).dot(positions[a]);
+                    faces.push(if out > 0.0 { [a, b, c] } else { [a, c, b] });
+                }
+            }
+        }
+    }
+    let mut mesh =
+        TriangleMesh { positions: positions.iter().map(|p| p.normalize()).collect(), ..Default::default() };
+    let mut middles: HashMap<(usize, usize), usize> = HashMap::new();
+    for face in faces {
+        let middle = [0, 1, 2].map(|i| {
+            let (a, b) = (face[i], face[(i + 1) % 3]);
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                mesh.positions.push((mesh.positions[a] + mesh.positions[b]).normalize());
+                mesh.positions.len() - 1
+            })
+        });
+        let [a, b, c] = face.map(|i| i as u32);
+        let [ab, bc, ca] = middle.map(|i| i as u32);
+        mesh.triangles.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+    }
+    mesh
+}
+
+fn sun(stage: &mut Stage, toward: DVec3) {
+    let turn = DQuat::from_rotation_arc(DVec3::NEG_Z, -toward.normalize());
+    stage.add(Light::Directional { irradiance: Vec3::ONE, angle: 0.0 }, DAffine3::from_quat(turn));
+}
+
+/// Radiance along the meridian from the sun's side to the other, of a ball that the sun meets at 60 degrees to the eye.
+fn meridian(mesh: TriangleMesh, integrator: Integrator, place: Place) -> Vec<f64> {
+    let (size, rows) = (601, 3);
+    let shift = DVec3::splat(place.shift);
+    let mut stage = Stage::placed(settings(size, rows, integrator, 1), place.scale, shift);
+    stage.add_mesh(mesh, Material::lambert(Vec3::ONE), HERE);
+    sun(&mut stage, DVec3::new(60f64.to_radians().sin(), 0.0, 60f64.to_radians().cos()));
+    stage.look(DVec3::new(0.001, 0.002, 3.0), DVec3::ZERO, DVec3::Y, 2.0);
+    let (film, _) = stage.expose(4, || true);
+    // Without the silhouette, and from where the sun stands straight above.
+    let row: Vec<f64> = film.row(rows / 2).map(|pixel| pixel.mean().x).collect();
+    let row: Vec<f64> = row[20..size as usize - 20].iter().rev().copied().collect();
+    let brightest = row.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+    row[brightest..].to_vec()
+}
+
+/// No steps, and brightness goes one way.
+#[must_use]
+pub fn judge_meridian(what: &str, shade: &[f64]) -> Vec<Check> {
+    let most = shade.iter().copied().fold(0.0, f64::max);
+    let steps = || shade.windows(2).map(|pair| (pair[1] - pair[0]) / most);
+    let n = shade.len() as u64;
+    let (down, up) = (steps().fold(0.0, |m, s| larger(m, -s)), steps().fold(0.0, larger));
+    vec![
+        Check::new(format!("{what}: largest step, of the most"), n, "pixels", down, 0.02),
+        Check::new(format!("{what}: largest step the wrong way"), n, "pixels", up, 0.02),
+    ]
+}
+
+fn terminator(trial: &Trial<'_>) -> Vec<Check> {
+    let mut checks = Vec::new();
+    for place in places(trial.effort) {
+        for (name, mesh) in [("80 facets", icosphere()), ("168 facets", ball(8))] {
+            for integrator in [Integrator::Direct, Integrator::Path] {
+                let shade = meridian(smooth(mesh.clone()), integrator, place);
+                let what = format!("{name}, {}, {}", integrator.name(), place.name());
+                checks.extend(judge_meridian(&what, &shade));
+            }
+        }
+        checks.push(leak(place));
+    }
+    checks.push(flat_normals());
+    checks
+}
+
+/// Facets as they are, for a test of the test.
+#[must_use]
+pub fn faceted_meridian() -> Vec<f64> {
+    meridian(icosphere(), Integrator::Direct, Place::ORIGIN)
+}
+
+/// A wall of paper a hair away from the side of a cube with smoothed normals, between it and the sun: nothing leaks
+/// around it.
+fn leak(place: Place) -> Check {
+    let shift = DVec3::splat(place.shift);
+    let mut stage = Stage::placed(settings(64, 64, Integrator::Direct, 1), place.scale, shift);
+    stage.add_mesh(smooth(cube()), Material::lambert(Vec3::ONE), HERE);
+    let paper = quad(Vec3::new(1.001, -4.0, -4.0), Vec3::Y * 8.0, Vec3::Z * 8.0);
+    stage.add_mesh(paper, Material::lambert(Vec3::ZERO), HERE);
+    sun(&mut stage, DVec3::new(1.0, 0.2, 0.1));
+    stage.look(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::X, 1.9);
+    let (film, _) = stage.expose(4, || true);
+    let lit = reds(&film).iter().filter(|r| **r != 0.0).count() as u64;
+    Check::none(format!("lit behind paper, {}", place.name()), 64 * 64, "pixels", lit)
+}
+
+/// A mesh whose normals are those of its facets looks as one that has none.
+fn flat_normals() -> Check {
+    let plain = cube();
+    let mut told = TriangleMesh::default();
+    for triangle in 0..plain.triangles.len() {
+        let [a, b, c] = plain.corners(triangle);
+        let first = told.positions.len() as u32;
+        told.positions.extend([a, b, c]);
+        told.normals.extend([(b - a).cross(c - a).normalize(); 3]);
+        told.triangles.push([first, first + 1, first + 2]);
+    }
+    let picture = |mesh: TriangleMesh| {
+        let mut stage = Stage::new(settings(64, 64, Integrator::Direct, 1));
+        stage.add_mesh(mesh, Material::default(), HERE);
+        sun(&mut stage, DVec3::new(1.0, 2.0, 3.0));
+        stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
+        stage.look_wide(DVec3::new(3.0, 2.0, 4.0), DVec3::ZERO);
+        stage.expose(16, || true).0
+    };
+    differing("flat normals change nothing", &picture(told), &picture(plain))
+}
+
+/// Numbers that files have been seen to hold.
+const ODD: [f32; 12] =
+    [0.0, -0.0, 1.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 1e-30, 1e-45, f32::MAX];
+
+fn odd(rng: &mut Rng) -> f32 {
+    if rng.bits() & 1 == 0 { rng.unit() * 2.0 - 1.0 } else { ODD[rng.bits() as usize % ODD.len()] }
+}
+
+/// A ball under a white sky, whatever its normals: white where it is diffuse, and never black.
+fn odd_normals(trial: &Trial<'_>) -> Vec<Check> {
+    let kinds: [(&str, fn(Vec3, &mut Rng) -> Vec3); 6] = [
+        ("zero", |_, _| Vec3::ZERO),
+        ("no number", |_, _| Vec3::NAN),
+        ("backward", |p, _| -p),
+        ("opposite at every other corner", |p, rng| if rng.bits() & 1 == 0 { p } else { -p }),
+        ("tiny", |p, _| p * 1e-30),
+        ("anything", |_, rng| Vec3::new(odd(rng), odd(rng), odd(rng))),
+    ];
+    let surfaces = [
+        ("diffuse", Material::lambert(Vec3::ONE)),
+        (
+            "metal",
+            Material {
+                glossy: Glossy::Ggx { metallic: 1.0, roughness: 0.3, texture: None },
+                ..Material::lambert(Vec3::ONE)
+            },
+        ),
+        ("mirror", Material::perfect_mirror(Vec3::ONE)),
+    ];
+    let mut checks = Vec::new();
+    for (name, normal) in kinds {
+        for (surface, material) in &surfaces {
+            if trial.interrupted() {
+                return checks;
+            }
+            let mut rng = Rng(trial.seed.wrapping_add(1));
+            let mut mesh = ball(8);
+            mesh.normals = mesh.positions.iter().map(|p| normal(*p, &mut rng)).collect();
+            let mut stage = Stage::new(settings(64, 64, Integrator::Path, 4));
+            stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
+            stage.add_mesh(mesh, material.clone(), HERE);
+            stage.look(DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO, DVec3::Y, 2.2);
+            let (film, _) = stage.expose(16, || true);
+            let what = format!("{name}, {surface}: black or no number");
+            checks.push(no_light(what, &reds(&film), true));
+            checks.push(Check::none(
+                format!("{name}, {surface}: dropped"),
+                64 * 64 * 16,
+                "samples",
+                film.dropped(),
+            ));
+            trial.tell("H2", name, 0.5);
+        }
+    }
+    checks
+}
+
+/// A square of size 2 with u along +X and v along −Y, whose normal map is one texel.
+fn mapped(texel: [u8; 4], scale: f32, tangent: Vec4, uvs: [Vec2; 4], place: DAffine3, eye: DVec3) -> Stage {
+    let mut stage = Stage::new(settings(8, 8, Integrator::Direct, 1));
+    let mesh = TriangleMesh {
+        positions: [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec(),
+        normals: vec![Vec3::Z; 4],
+        uvs: uvs.to_vec(),
+        tangents: vec![tangent; 4],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..TriangleMesh::default()
+    };
+    let texels = Arc::new(Texels { width: 1, height: 1, texels: vec![texel] });
+    let texture =
+        Texture { texels, encoding: Encoding::Linear, wrap: [Wrap::Repeat; 2], filter: Filter::Nearest };
+    let texture = stage.app.world.spawn(texture).id();
+    let normal_map = Some(NormalMap { texture: texture.into(), scale });
+    stage.add_mesh(mesh, Material { normal_map, double_sided: true, ..Material::lambert(Vec3::ONE) }, place);
+    stage.look(eye, DVec3::ZERO, eye.any_orthonormal_vector(), 0.1 * eye.length());
+    stage
+}
+
+const UVS: [Vec2; 4] = [Vec2::new(0.0, 1.0), Vec2::ONE, Vec2::new(1.0, 0.0), Vec2::ZERO];
+
+/// The normal that a mapped square is shaded by, as suns see it: off the exact one by.
+fn carried(trial: &Trial<'_>) -> Vec<Check> {
+    let texel = [178, 153, 230, 255];
+    let n = (Vec3::new(178.0, 153.0, 230.0) / 255.0 * 2.0 - 1.0).as_dvec3();
+    let turn = DMat3::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 0.8);
+    let mut worst = 0.0f64;
+    let mut tried = 0;
+    for scale in [
+        DVec3::ONE,
+        DVec3::new(-1.0, 1.0, 1.0),
+        DVec3::new(1.0, -1.0, 1.0),
+        DVec3::new(2.0, 2.0, -2.0),
+        DVec3::splat(1e-3),
+    ] {
+        for strength in [1.0f32, 0.5, 0.0] {
+            for side in [1.0, -1.0] {
+                let matrix = turn * DMat3::from_diagonal(scale);
+                let axis = |v: DVec3| (matrix * v).normalize();
+                let out = axis(DVec3::Z);
+                let tilt = f64::from(strength);
+                let expected = (axis(DVec3::X) * n.x * tilt + axis(DVec3::Y) * n.y * tilt + out * n.z)
+                    .normalize()
+                    * side;
+                let tangent = Vec4::new(1.0, 0.0, 0.0, 1.0);
+                // A sun from near the normal itself: irradiance is the cosine.
+                for toward in [expected, (expected + out.any_orthonormal_vector() * 0.2).normalize()] {
+                    let place = DAffine3::from_mat3(matrix);
+                    let eye = out * side * 3.0 * scale.x.abs();
+                    let mut stage = mapped(texel, strength, tangent, UVS, place, eye);
+                    sun(&mut stage, toward);
+                    let (film, _) = stage.expose(1, || true);
+                    let cosine = toward.dot(expected);
+                    let off = reds(&film)
+                        .iter()
+                        .map(|r| (r * std::f64::consts::PI - cosine).abs())
+                        .fold(0.0, larger);
+                    worst = larger(worst, off);
+                    tried += 64;
+                }
+            }
+        }
+    }
+    trial.tell("H4", "carried along", 0.5);
+    vec![Check::new(
+        "placed, mirrored, squeezed, from both sides: cosine off by",
+        tried,
+        "pixels",
+        worst,
+        1e-5,
+    )]
+}
+
+/// Tangents and texture coordinates that say nothing: some light, no black, no NaN.
+fn odd_maps(trial: &Trial<'_>) -> Vec<Check> {
+    let count = trial.pick(200, 2000, 100_000);
+    let of = |i: u64| {
+        let mut rng = Rng(trial.seed.wrapping_add(i));
+        let tangent = Vec4::new(odd(&mut rng), odd(&mut rng), odd(&mut rng), odd(&mut rng));
+        let uvs = [0; 4].map(|_| Vec2::new(odd(&mut rng), odd(&mut rng)));
+        let texel = [0; 4].map(|_| rng.bits() as u8);
+        let mut stage = mapped(texel, rng.unit() * 4.0, tangent, uvs, HERE, DVec3::new(0.9, 0.6, 3.0));
+        stage.add(Light::Environment { radiance: Vec3::ONE }, HERE);
+        let (film, _) = stage.expose(16, || true);
+        (no_light("", &reds(&film), true).ours as u64, film.dropped())
+    };
+    let (wrong, dropped) = (0..count)
+        .into_par_iter()
+        .filter(|_| !trial.interrupted())
+        .map(of)
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    vec![
+        Check::none("odd tangents and coordinates: black or no number", count * 64, "pixels", wrong),
+        Check::none("odd tangents and coordinates: dropped", count * 64 * 16, "samples", dropped),
+    ]
+}
+
+/// Coarse and smooth.
+pub const H1: Case = Case {
+    id: "H1",
+    title: "the edge of the shadow on coarse smooth meshes; nothing leaks around what is near",
+    limit: "steps of at most 2 % of the most; 0 pixels lit; flat meshes unchanged to the bit",
+    run: terminator,
+};
+
+/// Odd normals.
+pub const H2: Case = Case {
+    id: "H2",
+    title: "normals that are zero, no number, backward: no black dot under a white sky",
+    limit: "0",
+    run: odd_normals,
+};
+
+/// Normal maps.
+pub const H4: Case = Case {
+    id: "H4",
+    title: "normal maps: carried along by placements; without directions, no harm",
+    limit: "1e-5; 0 black pixels",
+    run: |trial| [carried(trial), odd_maps(trial)].concat(),
+};

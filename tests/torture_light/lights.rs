@@ -1,0 +1,224 @@
+//! Renderers with a mistake in them, measured as ours is.
+
+use crate::{finds, trial};
+use glam::DVec3;
+use penumbra::torture::light::lamps::{cut_by_the_horizon, quads, touching_the_floor};
+use penumbra::torture::light::meter::{Ask, Meter, Plan, Reading, measure, ours};
+use penumbra::torture::light::oracle;
+use penumbra::torture::light::pictures::fireflies;
+use penumbra::torture::light::remedies::{choice, densities, solid_angles};
+use penumbra::torture::light::rng::Rng;
+use penumbra::torture::light::rooms::{awkward_places, judge_form_factor, squares};
+use penumbra::torture::light::shadows::penumbra;
+use penumbra::torture::light::spot::{Expected, Spot, Thing};
+use penumbra::torture::{Check, Place};
+
+fn judged(spots: &[Spot], meter: &Meter) -> Vec<Check> {
+    let plan = Plan { places: &[Place::ORIGIN], ..Plan::of("X") };
+    measure(&trial(), plan, spots, meter)
+}
+
+fn right(ask: &Ask) -> Reading {
+    ours(ask, &|| true)
+}
+
+/// Ours, with every pixel changed.
+fn but(ask: &Ask, change: impl Fn(usize, f64) -> f64) -> Reading {
+    let mut reading = right(ask);
+    reading.pixels.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = change(i, *pixel));
+    reading
+}
+
+/// A renderer of its own: points of a parallelogram, evenly by area, and what each brings.
+fn by_area([corner, u, v]: [DVec3; 3], ask: &Ask, brought: impl Fn(f64, f64, f64) -> f64) -> Reading {
+    let mut rng = Rng(u64::from(ask.seed) + 1);
+    let (normal, side) = (ask.spot.normal, u.cross(v));
+    let mut pixel = || {
+        let mut sum = 0.0;
+        for _ in 0..ask.samples {
+            let d = corner + u * f64::from(rng.unit()) + v * f64::from(rng.unit()) - ask.spot.point;
+            let there = d.normalize();
+            let [here, there] = [normal.dot(there).max(0.0), side.dot(there).abs()];
+            sum += brought(here, there, d.length_squared());
+        }
+        sum / f64::from(ask.samples)
+    };
+    let pixels: Vec<f64> = (0..256).map(|_| pixel()).collect();
+    Reading { pixels, samples: 256 * u64::from(ask.samples), dropped: 0, shadow_rays: 1 }
+}
+
+const OVERHEAD: [DVec3; 3] = [DVec3::new(-0.5, -0.5, 1.0), DVec3::X, DVec3::Y];
+
+#[test]
+fn another_renderer_passes_too() {
+    let mut spots = quads();
+    spots.truncate(1);
+    spots[0].computed = false;
+    let checks = judged(&spots, &|ask| by_area(OVERHEAD, ask, |here, there, d2| here * there / d2));
+    assert!(checks.iter().all(Check::holds), "{checks:#?}");
+}
+
+#[test]
+fn half_a_percent_more_light_is_found() {
+    let checks = judged(&quads(), &|ask| but(ask, |_, pixel| pixel * 1.005));
+    finds("standard errors off", &checks);
+    finds("computed", &checks);
+    // Computed light is known to far more digits.
+    finds("computed", &judged(&quads(), &|ask| but(ask, |_, pixel| pixel * 1.000_05)));
+}
+
+#[test]
+fn a_density_one_percent_wrong_is_found() {
+    let checks = judged(&quads(), &|ask| but(ask, |_, pixel| pixel / 1.01));
+    finds("standard errors off", &checks);
+    finds("integral", &densities(&trial(), &|_| 1.01));
+    finds("χ²", &densities(&trial(), &|wi| if wi.x < 0.3 { 0.97 } else { 1.03 }));
+}
+
+#[test]
+fn a_lost_cosine_is_found() {
+    let mut spots = quads();
+    spots.truncate(1);
+    let checks = judged(&spots, &|ask| by_area(OVERHEAD, ask, |_, there, d2| there / d2));
+    finds("standard errors off", &checks);
+    let checks = judged(&spots, &|ask| by_area(OVERHEAD, ask, |here, _, d2| here / d2));
+    finds("standard errors off", &checks);
+}
+
+#[test]
+fn a_horizon_that_cuts_nothing_is_found() {
+    let corner = DVec3::new(2.0, -1.0, -1.0);
+    let (u, v) = (DVec3::Y * 2.0, DVec3::Z * 2.0);
+    let corners = [corner, corner + u, corner + u + v, corner + v];
+    let unclipped = oracle::unclipped_polygon(&corners, DVec3::ZERO, DVec3::Z);
+    let mut spots = cut_by_the_horizon();
+    spots.truncate(1);
+    finds("computed", &judged(&spots, &|ask| but(ask, |_, _| unclipped)));
+}
+
+#[test]
+fn light_sampled_by_area_where_it_is_near_is_found() {
+    let spots = &touching_the_floor()[3..4];
+    let light = [DVec3::new(0.0, -1.0, 0.0), DVec3::Y * 2.0, DVec3::Z];
+    let checks = judged(spots, &|ask| {
+        let few = Ask { samples: ask.samples.min(1024), ..*ask };
+        by_area(light, &few, |here, there, d2| here * there / d2)
+    });
+    finds("standard errors, relative", &checks);
+}
+
+#[test]
+fn computed_light_that_was_sampled_is_found() {
+    let checks =
+        judged(&quads(), &|ask| right(&Ask { computed: false, samples: ask.samples.max(64), ..*ask }));
+    finds("rays spent", &checks);
+}
+
+#[test]
+fn clamped_samples_are_found() {
+    // The disk's, by area: one sample in some hundred brings more than 32.
+    let spots = &fireflies()[1..2];
+    let clamped = |most: f64| {
+        move |ask: &Ask| {
+            let mut rng = Rng(u64::from(ask.seed) + 1);
+            let mut pixel = || {
+                let mut sum = 0.0;
+                for _ in 0..ask.samples {
+                    let r2 = f64::from(rng.unit()) + 0.05 * 0.05;
+                    sum += (std::f64::consts::PI * (0.05 / r2).powi(2)).min(most);
+                }
+                sum / f64::from(ask.samples)
+            };
+            let pixels: Vec<f64> = (0..256).map(|_| pixel()).collect();
+            Reading { pixels, samples: 256 * u64::from(ask.samples), dropped: 0, shadow_rays: 1 }
+        }
+    };
+    finds("standard errors off", &judged(spots, &clamped(100.0)));
+    let off = judged(spots, &clamped(f64::INFINITY));
+    let off: Vec<_> = off.into_iter().filter(|check| check.what.contains("errors off")).collect();
+    assert!(off.iter().all(Check::holds), "{off:#?}");
+}
+
+#[test]
+fn one_pixel_in_the_umbra_is_found() {
+    let spots = penumbra(1.0, 9);
+    let leak = |ask: &Ask| {
+        let dark = matches!(ask.spot.expected, Expected::Dark);
+        but(ask, |i, pixel| if dark && i == 77 { 1e-30 } else { pixel })
+    };
+    finds("exactly dark", &judged(&spots, &leak));
+    let minus = |ask: &Ask| but(ask, |_, pixel| if pixel == 0.0 { -0.0 } else { pixel });
+    finds("exactly dark", &judged(&spots, &minus));
+    // And one bit where all of the light should be seen.
+    let bit = |ask: &Ask| {
+        let same = matches!(ask.spot.expected, Expected::Same(_));
+        but(ask, |i, pixel| if same && i == 3 { pixel.next_up() } else { pixel })
+    };
+    finds("exactly the same", &judged(&spots, &bit));
+}
+
+/// The opaque half-plane is moved: an edge of shadow goes over a hundredth of the light.
+#[test]
+fn an_edge_a_little_off_is_found() {
+    let checks = judged(&penumbra(1.0, 9), &|ask| {
+        let mut spot = ask.spot.clone();
+        for thing in &mut spot.things {
+            if let Thing::Mesh(mesh, ..) = thing {
+                mesh.positions.iter_mut().for_each(|p| p.x -= 0.003);
+            }
+        }
+        right(&Ask { spot: &spot, ..*ask })
+    });
+    finds("computed", &checks);
+    finds("standard errors off", &checks);
+}
+
+#[test]
+fn what_is_no_number_is_found() {
+    let odd = |bad: f64| move |ask: &Ask| but(ask, |i, pixel| if i == 9 { bad } else { pixel });
+    for bad in [f64::NAN, f64::INFINITY, -1e-9] {
+        finds("finite", &judged(&awkward_places(), &odd(bad)));
+    }
+    finds("computed", &judged(&quads(), &odd(f64::NAN)));
+    let sampled: Vec<Spot> = quads().into_iter().map(|spot| Spot { computed: false, ..spot }).collect();
+    let few = |ask: &Ask| odd(f64::NAN)(&Ask { samples: ask.samples.min(64), ..*ask });
+    finds("standard errors off", &judged(&sampled, &few));
+    let dropped = |ask: &Ask| Reading { dropped: 1, ..right(ask) };
+    finds("no number", &judged(&quads(), &dropped));
+}
+
+#[test]
+fn a_form_factor_half_a_percent_off_is_found() {
+    let (_, _, exact) = squares()[0];
+    let mut rng = Rng(4);
+    let factors = |by: f64, rng: &mut Rng| -> Vec<f64> {
+        (0..16).map(|_| exact * by * (1.0 + 1e-3 * (f64::from(rng.unit()) - 0.5))).collect()
+    };
+    let fair = judge_form_factor("fair", 1, &factors(1.0, &mut rng), exact);
+    assert!(fair.iter().all(Check::holds), "{fair:#?}");
+    finds("standard errors off", &judge_form_factor("off", 1, &factors(1.005, &mut rng), exact));
+    let noisy: Vec<f64> = (0..16).map(|i| exact * (1.0 + 0.05 * f64::from(i % 3 - 1))).collect();
+    finds("4.5 standard errors", &judge_form_factor("noisy", 1, &noisy, exact));
+}
+
+#[test]
+fn choice_by_power_alone_is_found() {
+    // Power 1e8 and 1; what is near and faint brings as much.
+    let by_power = choice("by power", &[1.0 - 1e-8, 1e-8], &[1.0, 1.0]);
+    assert!(!by_power.holds(), "{by_power:?}");
+    assert!(choice("half by power", &[0.75, 0.25], &[1.0, 1.0]).holds());
+}
+
+#[test]
+fn a_solid_angle_by_arc_cosines_is_found() {
+    // The excess of the angles over half a turn: nothing is left of it far away, even in double precision.
+    let by_excess = |corners: [DVec3; 3]| {
+        let [a, b, c] = corners.map(DVec3::normalize);
+        let angle = |a: DVec3, b: DVec3, c: DVec3| {
+            let (n, m) = (a.cross(b).normalize(), a.cross(c).normalize());
+            n.dot(m).clamp(-1.0, 1.0).acos()
+        };
+        angle(a, b, c) + angle(b, c, a) + angle(c, a, b) - std::f64::consts::PI
+    };
+    assert!(!solid_angles(1000, 1, by_excess).holds());
+}

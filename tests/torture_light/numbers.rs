@@ -1,0 +1,250 @@
+//! Random numbers, sums and errors that are a little wrong.
+
+use crate::finds;
+use glam::Vec2;
+use penumbra::torture::Check;
+use penumbra::torture::light::meter::{Ask, ours};
+use penumbra::torture::light::numbers::{below_one, neighbours, net, over_seeds, unbiased};
+use penumbra::torture::light::pictures::{
+    adaptively, bias, bit_of_everything, differing, in_passes, strip, strip_in_closed_form,
+};
+use penumbra::torture::light::shadows::penumbra;
+use penumbra::torture::light::slopes::{Slope, errors, judge_long_run, judge_slope};
+use penumbra::torture::light::sums::{Accumulator, a_day, adding, poison};
+use penumbra::torture::light::{lamps::quads, rng::Rng};
+use penumbra::torture::stage::reds;
+use penumbra::trace::allot::EVEN;
+use penumbra::trace::sampler::{Sampler, hash, unit_float};
+use penumbra::trace::{Film, Sampling, TraceScene, trace_pass};
+
+#[test]
+fn bits_that_become_one_are_found() {
+    assert!(!below_one("by multiplication", |x| x as f32 * 2f32.powi(-32)).holds());
+    assert!(!below_one("one too large", |x| (x >> 8) as f32 / ((1 << 24) - 1) as f32).holds());
+}
+
+#[test]
+fn points_that_are_no_net_are_found() {
+    let good = |i: u32| Sampler::new(glam::UVec2::new(5, 9), 2 * i, 1).pair(3);
+    assert!(net("ours", 12, good).holds());
+    // An index in f32 forgets its last bit after 2²⁴.
+    let first = (1 << 24) + 1;
+    let rounded = |i: u32| good((first + i) as f32 as u32);
+    assert!(!net("index in f32", 12, rounded).holds());
+    let mut rng = Rng(1);
+    let random: Vec<Vec2> = (0..4096).map(|_| rng.pair()).collect();
+    assert!(!net("random", 12, |i| random[i as usize]).holds());
+    // One point of all.
+    assert!(!net("one moved", 12, |i| if i == 100 { Vec2::splat(0.3) } else { good(i) }).holds());
+}
+
+#[test]
+fn weak_scrambling_is_found() {
+    let points = [(6, 2)];
+    let fair = over_seeds("ours", 10_000, 0, &points, |i, p, s| Sampler::new(glam::UVec2::ONE, i, s).pair(p));
+    assert!(fair.holds(), "{fair:?}");
+    let low_bits = |_, _, seed: u32| Vec2::new(unit_float(0x1234_5678 ^ seed), unit_float(hash(seed)));
+    assert!(!over_seeds("only low bits change", 10_000, 0, &points, low_bits).holds());
+    let shifted = |_, _, seed: u32| Vec2::new(unit_float(seed << 18), unit_float(hash(seed)));
+    assert!(!over_seeds("too even", 10_000, 0, &points, shifted).holds());
+}
+
+#[test]
+fn a_small_bias_of_few_samples_is_found() {
+    let mut rng = Rng(2);
+    let estimates: Vec<f64> = (0..100_000).map(|_| 0.9 + 0.2 * f64::from(rng.unit())).collect();
+    assert!(unbiased("fair", 1, &estimates, 1.0).holds());
+    assert!(!unbiased("off", 1, &estimates, 1.002).holds());
+}
+
+#[test]
+fn repeated_seeds_are_found() {
+    let spots = penumbra(1.0, 5);
+    let pixels = ours(&Ask { side: 128, ..Ask::new(&spots[2], 2, 0) }, &|| true).pixels;
+    assert!(neighbours("ours", 128, &pixels).holds());
+    // Pairs of neighbours have one seed.
+    let pairs: Vec<f64> = (0..pixels.len()).map(|i| pixels[i & !1]).collect();
+    assert!(!neighbours("pairs", 128, &pairs).holds());
+    // All tiles have the same seeds.
+    let tiles: Vec<f64> = (0..pixels.len()).map(|i| pixels[(i / 128 % 8) * 128 + i % 8]).collect();
+    assert!(!neighbours("tiles", 128, &tiles).holds());
+    assert!(!neighbours("no noise at all", 128, &vec![1.0; 128 * 128]).holds());
+}
+
+/// What many do.
+#[derive(Clone, Default)]
+struct Single {
+    sums: [f32; 2],
+    counts: [u32; 2],
+}
+
+impl Accumulator for Single {
+    fn add(&mut self, index: u32, sample: f32) -> bool {
+        let half = index as usize & 1;
+        self.sums[half] += sample;
+        self.counts[half] += 1;
+        true
+    }
+    fn mean(&self) -> f64 {
+        f64::from((self.sums[0] + self.sums[1]) / (self.counts[0] as f32 + self.counts[1] as f32))
+    }
+    fn halves(&self) -> [f64; 2] {
+        [0, 1].map(|half| f64::from(self.sums[half] / self.counts[half] as f32))
+    }
+    fn merge(&mut self, other: &Self) {
+        for half in 0..2 {
+            self.sums[half] += other.sums[half];
+            self.counts[half] = self.counts[half].wrapping_add(other.counts[half]);
+        }
+    }
+    fn count(&self) -> u64 {
+        self.counts.iter().map(|count| u64::from(*count)).sum()
+    }
+}
+
+/// And what is better, but not good enough for 2³² samples: a running mean in f64.
+#[derive(Clone, Default)]
+struct Running {
+    halves: [(f64, u64); 2],
+}
+
+impl Accumulator for Running {
+    fn add(&mut self, index: u32, sample: f32) -> bool {
+        let (mean, count) = &mut self.halves[index as usize & 1];
+        *count += 1;
+        *mean += (f64::from(sample) - *mean) / *count as f64;
+        true
+    }
+    fn mean(&self) -> f64 {
+        let [(a, m), (b, n)] = self.halves;
+        (a * m as f64 + b * n as f64) / (m + n) as f64
+    }
+    fn halves(&self) -> [f64; 2] {
+        self.halves.map(|(mean, _)| mean)
+    }
+    fn merge(&mut self, other: &Self) {
+        for half in 0..2 {
+            let ((a, m), (b, n)) = (self.halves[half], other.halves[half]);
+            self.halves[half] = ((a * m as f64 + b * n as f64) / (m + n).max(1) as f64, m + n);
+        }
+    }
+    fn count(&self) -> u64 {
+        self.halves.iter().map(|(_, count)| count).sum()
+    }
+}
+
+#[test]
+fn sums_in_single_precision_are_found() {
+    let checks = adding::<Single>(1 << 26, 0);
+    for word in ["0.1", "ones", "numbers in"] {
+        finds(word, &checks);
+    }
+    let checks = a_day::<Single>(1 << 24, 0);
+    finds("a day", &checks);
+    finds("change nothing", &checks);
+    assert!(!poison::<Single>().holds());
+    assert!(!poison::<Running>().holds());
+}
+
+#[test]
+fn a_variance_of_rounded_sums_is_found() {
+    // f32 of 1e4 has steps of a thousandth; squares of sums would be off by far more.
+    #[derive(Clone, Default)]
+    struct Coarse(Single);
+    impl Accumulator for Coarse {
+        fn add(&mut self, index: u32, sample: f32) -> bool {
+            self.0.add(index, (sample * 8.0).round() / 8.0)
+        }
+        fn mean(&self) -> f64 {
+            self.0.mean()
+        }
+        fn halves(&self) -> [f64; 2] {
+            self.0.halves()
+        }
+        fn merge(&mut self, other: &Self) {
+            self.0.merge(&other.0);
+        }
+        fn count(&self) -> u64 {
+            self.0.count()
+        }
+    }
+    finds("variance", &adding::<Coarse>(1000, 0));
+}
+
+/// A pixel that ends when its own halves agree is biased, most where it is dark.
+#[test]
+fn stopping_early_is_found() {
+    let (stage, exact) = (strip(), strip_in_closed_form());
+    let film = |seed: u32, samples: u32| {
+        let settings = penumbra::trace::RenderSettings { seed, ..*stage.scene().settings };
+        let scene = TraceScene { settings: &settings, ..stage.scene() };
+        let mut film = Film::new(settings.size, 0);
+        trace_pass(&scene, &mut film, samples, samples, || true);
+        film
+    };
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (mut stopping, mut fair) = (Vec::new(), Vec::new());
+    for seed in 0..200 {
+        let (all, few) = (film(seed, 16), film(seed, EVEN));
+        // Dark by chance is dark for ever.
+        let pairs = reds(&all).into_iter().zip(reds(&few));
+        let stopped = pairs.map(|(all, few)| if few == 0.0 { 0.0 } else { all });
+        stopping.push(mean(&stopped.collect::<Vec<f64>>()));
+        fair.push(mean(&reds(&adaptively(&stage, seed, 16))));
+    }
+    finds("standard errors off", &bias("stopping", 1, &stopping, exact));
+    let fair = bias("fair", 1, &fair, exact);
+    assert!(fair.iter().all(Check::holds), "{fair:#?}");
+}
+
+#[test]
+fn another_film_is_found() {
+    let reference = in_passes(&bit_of_everything(0), 2, &[4]);
+    assert!(differing("itself", &reference, &reference).holds());
+    assert!(!differing("another seed", &in_passes(&bit_of_everything(1), 2, &[4]), &reference).holds());
+    assert!(!differing("a sample more", &in_passes(&bit_of_everything(0), 2, &[5]), &reference).holds());
+    let mut one = reference.clone();
+    one.tiles_mut()[3].pixels_mut()[5].add(0, glam::Vec3::splat(1e-9));
+    assert_eq!(differing("one pixel", &one, &reference).ours, 1.0);
+}
+
+#[test]
+fn slopes_that_are_too_flat_are_found() {
+    let spot = &quads()[0];
+    let right = |ask: &Ask| ours(ask, &|| true);
+    let independent = errors(spot, Sampling::Independent, 4, 0, &right);
+    finds("slope", &judge_slope("independent for Sobol'", 1, &independent, Slope::Below(-0.9)));
+    // Seeds that are not drawn afresh: all of a picture's pixels are one.
+    let repeated = errors(spot, Sampling::Independent, 1, 0, &|ask| {
+        let mut reading = right(ask);
+        let first = reading.pixels[0];
+        reading.pixels.fill(first);
+        reading
+    });
+    finds("slope", &judge_slope("one pixel", 1, &repeated, Slope::Within(-0.5, 0.02)));
+    // A bias of a thousandth.
+    let biased = errors(spot, Sampling::Sobol, 2, 0, &|ask| {
+        let mut reading = right(ask);
+        reading.pixels.iter_mut().for_each(|pixel| *pixel *= 1.001);
+        reading
+    });
+    finds("four times the samples", &judge_slope("biased", 1, &biased, Slope::Below(-0.9)));
+}
+
+#[test]
+fn a_run_that_stalls_or_drifts_is_found() {
+    let mut rng = Rng(3);
+    let mut run = |error: &dyn Fn(f64) -> (f64, f64)| -> Vec<(u64, Vec<f64>)> {
+        let step = |k: i32| {
+            let n = 1 << (6 + k);
+            let (bias, noise) = error(f64::from(n));
+            let pixels = (0..256).map(|_| 1.0 + bias + noise * (f64::from(rng.unit()) - 0.5)).collect();
+            (n as u64, pixels)
+        };
+        (0..12).map(step).collect()
+    };
+    let fair = judge_long_run("fair", &run(&|n| (0.0, 1.0 / n.sqrt())), 1.0);
+    assert!(fair.iter().all(Check::holds), "{fair:#?}");
+    finds("drift", &judge_long_run("drifts", &run(&|n| (1e-6 * n, 1.0 / n.sqrt())), 1.0));
+    finds("error beside", &judge_long_run("stalls", &run(&|n| (0.0, 1.0 / n.min(256.0).sqrt())), 1.0));
+}
