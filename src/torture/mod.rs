@@ -5,8 +5,9 @@
 //! it must keep. Limits are those of theory (zero leaks, so many ulp, 4.5 standard errors), not of what
 //! was measured.
 
-mod geometry;
+pub mod geometry;
 mod light;
+pub mod oracle;
 mod place;
 mod table;
 mod trial;

@@ -6,8 +6,6 @@
 )]
 #![allow(clippy::duplicate_mod, reason = "several of the modules below use the same random numbers")]
 
-#[path = "../support/alone.rs"]
-mod alone;
 #[path = "../support/chi_square.rs"]
 mod chi_square;
 mod energy;

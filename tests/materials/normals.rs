@@ -1,12 +1,12 @@
 //! Normal maps, their frames, and that no normal makes a surface see itself.
 
-use crate::alone::Alone;
 use crate::geometry::{Rng, shared};
 use bevy_ecs::name::Name;
 use glam::{Affine2, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use penumbra::bvh::{Hit, Ray};
 use penumbra::load::{LoadOptions, SceneSource, load};
 use penumbra::scene::{Encoding, Filter, Material, Mesh, NormalMap, Texels, Texture, TriangleMesh, Wrap};
+use penumbra::torture::geometry::alone::Alone;
 use penumbra::trace::bsdf::normal::clear_of_surface;
 use penumbra::trace::scene::{Surface, TextureIndex};
 use penumbra::trace::surface::Interaction;

@@ -2,9 +2,7 @@
 #![allow(dead_code, unused_imports, reason = "each test file uses its part")]
 #![allow(clippy::print_stdout, reason = "a test shows its figures")]
 
-mod rng;
-
-pub use rng::Rng;
+pub use penumbra::torture::oracle::Rng;
 
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DQuat, DVec3, UVec2, Vec3};

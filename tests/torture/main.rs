@@ -1,0 +1,3 @@
+//! The torture chamber's cases hold, and every checker finds who does it wrong.
+
+mod geometry;
