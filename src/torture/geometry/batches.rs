@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Rays of one batch.
-pub const BATCH: u64 = 4096;
+pub const BATCH: u64 = 1024;
 
 /// What is being counted: for the display of progress.
 pub struct Counting<'a> {
@@ -33,7 +33,7 @@ impl Counting<'_> {
             .map(|number| {
                 let counts = batch(number);
                 let now = done.fetch_add(1, Ordering::Relaxed) + 1;
-                if now.is_multiple_of(64) {
+                if now.is_multiple_of(256) {
                     let part = from + (to - from) * now as f64 / batches as f64;
                     self.trial.tell(self.id, self.what, part);
                 }

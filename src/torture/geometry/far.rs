@@ -8,7 +8,7 @@ use crate::sync::RenderOrigin;
 use crate::torture::{Case, Check, Trial};
 use crate::trace::{Film, RenderSettings};
 use bevy_ecs::prelude::*;
-use glam::{DVec3, UVec2};
+use glam::{DQuat, DVec3, UVec2};
 
 pub(super) const CASE: Case = Case {
     id: "G7",
@@ -17,7 +17,7 @@ pub(super) const CASE: Case = Case {
     run: |trial| run(trial, None),
 };
 
-/// The box under a root for each of the translations. `origin`: where render space has its own, if not where the scene is.
+/// The box, a 256th as large so that it is of about 2, under a root for each of the translations. `origin`: where render space has its own, if not where the scene is.
 fn picture(translations: &[DVec3], origin: Option<DVec3>, samples: u32) -> Option<Film> {
     let settings = RenderSettings { size: UVec2::new(64, 64), ..RenderSettings::default() };
     let source = SceneSource::BuiltIn("cornell");
@@ -26,8 +26,10 @@ fn picture(translations: &[DVec3], origin: Option<DVec3>, samples: u32) -> Optio
     world.insert_resource(RenderOrigin(origin));
     let mut query = world.query_filtered::<Entity, (With<Transform>, Without<ChildOf>)>();
     let mut children: Vec<Entity> = query.iter(world).collect();
-    for &translation in translations {
-        let parent = world.spawn(Transform::from_translation(translation)).id();
+    let small = Transform::from_parts(DVec3::ZERO, DQuat::IDENTITY, DVec3::splat(1.0 / 256.0));
+    let moved = translations.iter().map(|&translation| Transform::from_translation(translation));
+    for transform in std::iter::once(small).chain(moved) {
+        let parent = world.spawn(transform).id();
         for child in children {
             world.entity_mut(child).insert(ChildOf(parent));
         }

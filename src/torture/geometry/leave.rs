@@ -5,7 +5,7 @@ use super::meshes::{Triangles, with_surface};
 use super::stage::ball;
 use crate::bvh::{Hit, Ray};
 use crate::scene::TriangleMesh;
-use crate::torture::oracle::{Rng, ask};
+use crate::torture::oracle::{Rng, ask, side};
 use crate::torture::{Case, Check, Place, Trial};
 use crate::trace::surface::Interaction;
 use glam::{DAffine3, Vec3};
@@ -46,9 +46,10 @@ fn start(alone: &Alone, rng: &mut Rng, number: u32, direction: impl Fn(Vec3) -> 
 }
 
 /// Rays from points of one triangle: half without an end, half to points of any size with `t_max` 1 (pbrt's tests
-/// `Triangle.Reintersect`).
+/// `Triangle.Reintersect`), of which it is certain on what side of the triangle's plane they are.
 fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec<Ray> {
     let mut rays = Vec::with_capacity(count);
+    let placed = *alone.geometry.tlas.placements()[0].world_from_local();
     while rays.len() < count {
         let endless = rays.len() < count / 2;
         let target = Vec3::ZERO.map(|_| rng.decades(-8.0, 8.0));
@@ -60,7 +61,11 @@ fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec<Ray
         } else {
             Ray { origin, direction: target - origin, t_max: 1.0 }
         };
-        if ray.direction != Vec3::ZERO && ray.direction.is_finite() {
+        // A point in the plane of the triangle, as far as floats can tell, may be on the triangle.
+        let corners = alone.geometry.instances[0].mesh.corners(0);
+        let local = placed.inverse().transform_point3(target.as_dvec3()).as_vec3();
+        let apart = endless || side(&corners, local) != 0;
+        if apart && ray.direction != Vec3::ZERO && ray.direction.is_finite() {
             rays.push(ray);
         }
     }
