@@ -47,7 +47,8 @@ fn start(alone: &Alone, rng: &mut Rng, number: u32, direction: impl Fn(Vec3) -> 
 
 /// Rays from points of one triangle: half without an end, half to points of any size with `t_max` 1 (pbrt's tests
 /// `Triangle.Reintersect`), of which it is certain on what side of the triangle's plane they are.
-fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec<Ray> {
+#[must_use]
+pub fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec<Ray> {
     let mut rays = Vec::with_capacity(count);
     let placed = *alone.geometry.tlas.placements()[0].world_from_local();
     while rays.len() < count {

@@ -16,12 +16,17 @@ pub mod instances;
 pub mod leaks;
 pub mod leave;
 pub mod meshes;
+mod show;
 pub mod stage;
 pub mod ties;
 pub mod worst;
 pub mod zero;
 
 use super::Case;
+use crate::load::Made;
+
+/// What can be looked at.
+pub(super) const SHOWS: &[Made] = show::SHOWS;
 
 /// The cases of this room.
 pub(super) const CASES: &[Case] = &[
