@@ -43,8 +43,7 @@ impl Engine for Textbook {
     fn closest(&self, r: &Ray) -> Option<(f32, u32)> {
         let mut hit = RayHit::none();
         self.bvh.ray_traverse(ray(r), &mut hit, |r, i| meets(r, &self.tris[i]));
-        (hit.primitive_id != u32::MAX)
-            .then(|| (hit.t, self.bvh.primitive_indices[hit.primitive_id as usize]))
+        (hit.primitive_id != u32::MAX).then(|| (hit.t, self.bvh.primitive_indices[hit.primitive_id as usize]))
     }
 
     #[inline(always)]

@@ -19,10 +19,9 @@ use penumbra::torture::geometry::exact::{FAMILIES, Shown, judge};
 use penumbra::torture::geometry::leave::{mesh, rays_off};
 use penumbra::torture::geometry::{leaks, meshes, zero};
 use penumbra::torture::oracle::{Maker, Rng, Tracer, inside};
-use penumbra::torture::{Effort, Place, Step, Trial};
+use penumbra::torture::Place;
 use penumbra::trace::surface::Interaction;
 use rayon::prelude::*;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Another engine, as a [`Tracer`].
@@ -100,11 +99,11 @@ fn contestants() -> Vec<Contestant> {
 }
 
 /// What one came to.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Row {
     pub name: String,
-    /// Nearest and any hit, by 10⁷ rays aimed at edges, corners and anywhere.
-    pub leaks: [f64; 2],
+    /// By 10⁷ rays aimed at edges, corners and anywhere: nearest hit at the origin, at all places, and any hit.
+    pub leaks: [f64; 3],
     /// Rays of which the answers to both questions contradict each other, by 10⁷.
     pub contradictions: f64,
     /// By 10⁶ rays and triangles where exact arithmetic is certain.
@@ -114,9 +113,26 @@ pub struct Row {
     /// By 10⁶ rays that leave a triangle by our bound.
     pub own: f64,
     /// By 10⁶ rays along axes and diagonals of a grid.
-    pub zero: f64,
+    pub axes: f64,
     /// 10⁶ rays per second on one thread: nearest and any hit.
     pub speed: [f64; 2],
+}
+
+impl Default for Row {
+    /// Nothing is known.
+    fn default() -> Self {
+        let no = f64::NAN;
+        Self {
+            name: String::new(),
+            leaks: [no; 3],
+            contradictions: no,
+            wrong: no,
+            ulp: [no; 2],
+            own: no,
+            axes: no,
+            speed: [no; 2],
+        }
+    }
 }
 
 fn main() {
@@ -128,64 +144,138 @@ fn main() {
     let (rays, pairs) = (number("--rays", 10_000_000), number("--pairs", 20_000));
     let to = arguments.iter().position(|a| a == "--to").and_then(|i| arguments.get(i + 1)).cloned();
     let contestants = contestants();
-    let speeds = speeds(&contestants);
+    if let Some(only) = arguments.iter().position(|a| a == "--only").and_then(|i| arguments.get(i + 1)) {
+        let one = contestants.iter().filter(|c| c.name == only);
+        return one.for_each(|contestant| measure(contestant, rays, pairs));
+    }
     let rows: Vec<Row> = contestants
         .iter()
-        .zip(speeds)
+        .zip(speeds(&contestants))
         .map(|(contestant, speed)| {
-            eprintln!("{} ...", contestant.name);
-            let row = Row { speed, ..measure(contestant, rays, pairs) };
-            eprintln!("{row:?}");
+            // Each in a process of its own: some do not survive it.
+            let mut row = Row { name: contestant.name.to_owned(), speed, ..Row::default() };
+            let child = std::process::Command::new(std::env::current_exe().expect("this program"))
+                .args(["--only", contestant.name, "--rays", &rays.to_string(), "--pairs", &pairs.to_string()])
+                .stderr(std::process::Stdio::null())
+                .output()
+                .expect("a child");
+            for line in String::from_utf8_lossy(&child.stdout).lines() {
+                let mut words = line.split(' ');
+                let what = words.next().unwrap_or_default();
+                let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+                match (what, &numbers[..]) {
+                    ("leaks", &[here, all, any, contradict]) => {
+                        (row.leaks, row.contradictions) = ([here, all, any], contradict);
+                    }
+                    ("exact", &[wrong, worst, most]) => (row.wrong, row.ulp) = (wrong, [worst, most]),
+                    ("own", &[own]) => row.own = own,
+                    ("axes", &[axes]) => row.axes = axes,
+                    _ => {}
+                }
+            }
+            eprintln!("{row:?}, {}", child.status);
             row
         })
         .collect();
-    let head = format!(
-        "{rays} rays from inside of closed meshes at 6 places, {pairs} exact pairs of each of {} kinds. One thread for speed. Embree {}.\n",
-        FAMILIES.len(),
-        engines::embree::version()
-    );
     let (markdown, csv) = tables(&rows);
-    println!("{head}\n{markdown}");
+    let page = page(&markdown, rays, pairs);
+    println!("{page}");
     if let Some(to) = to {
         let write = |name: &str, text: &str| std::fs::write(format!("{to}/{name}"), text).expect("written");
         write("peers.csv", &csv);
-        write("peers.table.md", &format!("{head}\n{markdown}"));
+        write("peers.md", &page);
         write("peers.svg", &plot::plot(&rows));
     }
 }
 
-fn measure(contestant: &Contestant, rays: u64, pairs: u64) -> Row {
-    let maker = contestant.maker();
-    let (closest, any, contradictions, tried) = leaking(&maker, rays);
-    let by = |count: u64, tried: u64, million: f64| count as f64 / tried as f64 * million;
-    let (wrong, ulp) = exact(&maker, pairs);
-    let (own, leaving) = own_hits(&maker, 2000);
-    let (progress, interrupt) = (|_: Step| {}, AtomicBool::new(false));
-    let trial = Trial { effort: Effort::Normal, seed: 1, progress: &progress, interrupt: &interrupt };
-    let zero = zero::run(&trial, std::slice::from_ref(&maker));
-    let zero = (zero.iter().map(|c| c.ours).sum::<f64>(), zero.iter().map(|c| c.tried).sum::<u64>());
-    Row {
-        name: contestant.name.to_owned(),
-        leaks: [by(closest, tried, 1e7), by(any, tried, 1e7)],
-        contradictions: by(contradictions, tried, 1e7),
-        wrong,
-        ulp,
-        own: by(own, leaving, 1e6),
-        zero: zero.0 / zero.1 as f64 * 1e6,
-        speed: [0.0; 2],
-    }
+fn page(table: &str, rays: u64, pairs: u64) -> String {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let cpu = read("/proc/cpuinfo");
+    let cpu = cpu.lines().find_map(|line| line.strip_prefix("model name")?.split(": ").nth(1));
+    let rustc = std::process::Command::new("rustc").arg("--version").output();
+    let rustc = rustc.map(|out| String::from_utf8_lossy(&out.stdout).trim().to_owned()).unwrap_or_default();
+    format!(
+        "# How fast, and how often wrong\n\n\
+         The geometric cases of `penumbra torture` on other engines and on ours, from one run of\n\
+         `benches/peers/torture.sh HARNESS --to assets/torture --rays {rays} --pairs {pairs}`.\n\n\
+         {} threads of {}, {} ({rustc}); Embree {}, tinybvh 1.6.8, obvhs 0.4.0. All with `target-cpu=native`.\n\n{table}\n\
+         ![Speed against leaks](peers.svg)\n\n\
+         - *crashed*: the process ended before it was measured.\n\
+         - *leaks*: {rays} rays from inside of five closed meshes at six places (origin, 1e3, 1e5, times 1e-3 and 1e3, and\n  \
+         (148376, 1234, -223423)), a third at random points of edges, a third exactly at corners; asked in batches.\n\
+         - *contradict*: nearest hit and any hit do not agree.\n\
+         - *wrong hit or miss*: {pairs} rays and triangles of each of five kinds (random, coordinates 1e-8 to 1e8, slivers of\n  \
+         aspect 1e6, at 1e-4 rad, within 4 ulp of an edge) where exact arithmetic has a margin above 8 eps of the products.\n\
+         - *t*: of their hits, where the determinant's condition is below 1000, steps of floats from the exact t.\n\
+         - *self-hits*: rays that leave triangles of coordinates 1e-8 to 1e8 by our bound of the point's error.\n\
+         - *along axes*: directions with components of 0 through a grid of whole numbers: no hit where there is one, the other way\n  \
+         round, or t off by more than 4 ulp.\n\
+         - *Mrays/s*: one thread, the aimed rays themselves in batches of 4096 out of a knot of 3600 triangles: all hit, and\n  \
+         neighbours have little in common but their origin. Best of seven, in turns.\n\
+         - *textbook*: Moeller and Trumbore's test of 1997 in obvhs's hierarchy.\n",
+        std::thread::available_parallelism().map_or(1, usize::from),
+        cpu.unwrap_or("an unknown processor"),
+        Isa::available().last().map_or("", |isa| isa.name()),
+        engines::embree::version()
+    )
 }
 
-/// Case G1.
-fn leaking(maker: &Maker<'_>, rays: u64) -> (u64, u64, u64, u64) {
+/// Tells line by line what is known, in case it does not survive the next.
+fn measure(contestant: &Contestant, rays: u64, pairs: u64) {
+    let maker = contestant.maker();
+    let by = |count: u64, tried: u64, million: f64| count as f64 / tried as f64 * million;
+    let [here, tried_here, closest, any, contradict, tried] = leaking(&maker, rays);
+    println!(
+        "leaks {} {} {} {}",
+        by(here, tried_here, 1e7),
+        by(closest, tried, 1e7),
+        by(any, tried, 1e7),
+        by(contradict, tried, 1e7)
+    );
+    let (wrong, tried) = axes(&maker);
+    println!("axes {}", by(wrong, tried, 1e6));
+    let (wrong, ulp) = exact(&maker, pairs);
+    println!("exact {wrong} {} {}", ulp[0], ulp[1]);
+    let (own, tried) = own_hits(&maker, 2000);
+    println!("own {}", by(own, tried, 1e6));
+}
+
+/// Case G3, but for the rule about equals: whether something is hit, and t within 4 ulp.
+fn axes(maker: &Maker<'_>) -> (u64, u64) {
+    let (mut wrong, mut tried) = (0, 0);
+    for (_, grid) in zero::grids() {
+        let tracer = (maker.make)(&grid.triangles());
+        for d in (0..27).filter(|&d| d != 13) {
+            let direction = glam::IVec3::new(d % 3, d / 3 % 3, d / 9) - 1;
+            for origin in zero::origins().step_by(7) {
+                let ray = Ray::new(origin.as_vec3() * 0.5, direction.as_vec3());
+                let expected = grid.first_hit(origin, direction).map(|(steps, _)| steps as f32 * 0.5);
+                let right = match (tracer.closest_hit(&ray), expected) {
+                    (Some(hit), Some(t)) => (hit.t - t).abs() <= 4.0 * (t.next_up() - t),
+                    (hit, expected) => hit.is_none() && expected.is_none(),
+                };
+                wrong += u64::from(!right);
+                tried += 1;
+            }
+        }
+    }
+    (wrong, tried)
+}
+
+/// Case G1: leaks at the origin of so many, and at all places: nearest, any, contradictions, of so many.
+fn leaking(maker: &Maker<'_>, rays: u64) -> [u64; 6] {
     let mut scenes = Vec::new();
     for (_, triangles) in meshes::closed() {
-        scenes.extend(Place::ALL.iter().filter_map(|place| meshes::moved(&triangles, |p| place.point(p))));
-        scenes.extend(meshes::moved(&triangles, |p| p + Vec3::new(148_376.0, 1234.0, -223_423.0)));
+        for place in Place::ALL {
+            let moved = meshes::moved(&triangles, |p| place.point(p));
+            scenes.extend(moved.map(|t| (place == Place::ORIGIN, t)));
+        }
+        let far = meshes::moved(&triangles, |p| p + Vec3::new(148_376.0, 1234.0, -223_423.0));
+        scenes.extend(far.map(|t| (false, t)));
     }
     let batches = rays.div_ceil(4096 * scenes.len() as u64);
-    let mut sums = (0, 0, 0, 0);
-    for triangles in &scenes {
+    let mut sums = [0; 6];
+    for (here, triangles) in &scenes {
         let tracer = (maker.make)(triangles);
         let origins = inside(&mut Rng(1), triangles, 61);
         let batch = |number: u64| {
@@ -196,11 +286,12 @@ fn leaking(maker: &Maker<'_>, rays: u64) -> (u64, u64, u64, u64) {
             let count = |is: &dyn Fn(bool, bool) -> bool| {
                 hits.iter().zip(&blocked).filter(|(hit, blocked)| is(hit.is_some(), **blocked)).count() as u64
             };
-            let leaks = (count(&|hit, _| !hit), count(&|_, blocked| !blocked));
-            (leaks.0, leaks.1, count(&|hit, blocked| hit != blocked), rays.len() as u64)
+            let (closest, all) = (count(&|hit, _| !hit), rays.len() as u64);
+            let (at_origin, tried) = if *here { (closest, all) } else { (0, 0) };
+            [at_origin, tried, closest, count(&|_, blocked| !blocked), count(&|hit, blocked| hit != blocked), all]
         };
-        let add = |a: (u64, u64, u64, u64), b: (u64, u64, u64, u64)| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3);
-        sums = add(sums, (0..batches).into_par_iter().map(batch).reduce(|| (0, 0, 0, 0), add));
+        let add = |a: [u64; 6], b: [u64; 6]| std::array::from_fn(|i| a[i] + b[i]);
+        sums = add(sums, (0..batches).into_par_iter().map(batch).reduce(|| [0; 6], add));
     }
     sums
 }
@@ -278,9 +369,10 @@ fn speeds(contestants: &[Contestant]) -> Vec<[f64; 2]> {
 }
 
 fn tables(rows: &[Row]) -> (String, String) {
-    let mut markdown = "| engine | leaks / 10^7, nearest | leaks / 10^7, any | nearest and any contradict / 10^7 | wrong hit or miss / 10^6 | t: worst ulp | t: 99.9 % ulp | self-hits / 10^6 | wrong along axes / 10^6 | Mrays/s, nearest | Mrays/s, any |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n".to_owned();
-    let mut csv = "engine,leaks_nearest_per_1e7,leaks_any_per_1e7,contradictions_per_1e7,wrong_per_1e6,t_worst_ulp,t_999_ulp,self_hits_per_1e6,axes_wrong_per_1e6,mrays_nearest,mrays_any\n".to_owned();
+    let mut markdown = "| engine | leaks / 10^7 at the origin | at all places | at all, any hit | nearest and any contradict / 10^7 | wrong hit or miss / 10^6 | t: worst ulp | t: 99.9 % ulp | self-hits / 10^6 | wrong along axes / 10^6 | Mrays/s, nearest | Mrays/s, any |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n".to_owned();
+    let mut csv = "engine,leaks_at_origin_per_1e7,leaks_per_1e7,leaks_any_per_1e7,contradictions_per_1e7,wrong_per_1e6,t_worst_ulp,t_999_ulp,self_hits_per_1e6,axes_wrong_per_1e6,mrays_nearest,mrays_any\n".to_owned();
     let short = |x: f64| match x {
+        x if x.is_nan() => "crashed".to_owned(),
         0.0 => "0".to_owned(),
         x if x.abs() >= 1e5 => format!("{x:.1e}"),
         x if x.abs() >= 100.0 => format!("{x:.0}"),
@@ -289,7 +381,8 @@ fn tables(rows: &[Row]) -> (String, String) {
     };
     for r in rows {
         let numbers = [
-            r.leaks[0], r.leaks[1], r.contradictions, r.wrong, r.ulp[0], r.ulp[1], r.own, r.zero, r.speed[0], r.speed[1],
+            r.leaks[0], r.leaks[1], r.leaks[2], r.contradictions, r.wrong, r.ulp[0], r.ulp[1], r.own, r.axes, r.speed[0],
+            r.speed[1],
         ];
         let cells: Vec<String> = numbers.iter().map(|&x| short(x)).collect();
         markdown += &format!("| {} | {} |\n", r.name, cells.join(" | "));

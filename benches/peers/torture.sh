@@ -4,7 +4,7 @@
 #   benches/peers/torture.sh HARNESS [--to FOLDER] [--rays N] [--pairs N]
 #
 # HARNESS is the folder that has `kernels` (see run.sh). Prints a table; with `--to assets/torture` it also
-# writes peers.csv, peers.table.md and peers.svg there. 10^7 rays take some minutes; what is built goes to target/peers-torture.
+# writes peers.csv, peers.md and peers.svg there. 10^7 rays take some minutes; what is built goes to target/peers-torture.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)

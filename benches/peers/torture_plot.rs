@@ -18,7 +18,7 @@ pub fn plot(rows: &[Row]) -> String {
         root.fill(&RGBColor(0xfe, 0xfe, 0xfe)).expect("filled");
         let speeds = || rows.iter().map(|r| r.speed[0]);
         let (low, high) = (speeds().fold(f64::INFINITY, f64::min) * 0.7, speeds().fold(0.0, f64::max) * 1.5);
-        let most = rows.iter().map(|r| r.leaks[0]).fold(10.0, f64::max) * 20.0;
+        let most = rows.iter().map(|r| r.leaks[1]).fold(10.0, f64::max) * 20.0;
         let mut chart = ChartBuilder::on(&root)
             .margin(14)
             .caption("Rays per second against leaks", ("sans-serif", 17).into_font().color(&INK))
@@ -39,11 +39,11 @@ pub fn plot(rows: &[Row]) -> String {
             .expect("mesh");
         // Names that would lie on each other are moved apart.
         let mut names: Vec<(f64, f64)> = Vec::new();
-        let mut order: Vec<&Row> = rows.iter().collect();
+        let mut order: Vec<&Row> = rows.iter().filter(|row| row.leaks[1].is_finite()).collect();
         order.sort_by(|a, b| b.speed[0].total_cmp(&a.speed[0]));
         for row in order {
             let color = if row.name.starts_with("penumbra") { OURS } else { THEIRS };
-            let at = (row.leaks[0].max(NONE), row.speed[0]);
+            let at = (row.leaks[1].max(NONE), row.speed[0]);
             chart.draw_series([Circle::new(at, 5, color.filled())]).expect("a point");
             let mut name = (at.0 * 1.25, at.1);
             while names.iter().any(|n| (n.0 / name.0).ln().abs() < 3.0 && (n.1 / name.1).ln().abs() < 0.09) {

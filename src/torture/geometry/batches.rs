@@ -4,7 +4,7 @@ use crate::torture::Trial;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Rays of one batch.
+/// Rays of a batch.
 pub const BATCH: u64 = 1024;
 
 /// What is being counted: for the display of progress.
@@ -17,13 +17,15 @@ pub struct Counting<'a> {
     pub what: &'a str,
     /// How much of the case is done before and after, 0 to 1.
     pub part: [f64; 2],
+    /// Rays of one batch.
+    pub batch: u64,
 }
 
 impl Counting<'_> {
     /// Gives `batch` numbers until there are `count` rays, and sums up what it counts, item by item. Returns how
     /// many rays there were, and the sums.
     pub fn sum(&self, count: u64, items: usize, batch: impl Fn(u64) -> Vec<u64> + Sync) -> (u64, Vec<u64>) {
-        let batches = count.div_ceil(BATCH);
+        let batches = count.div_ceil(self.batch);
         let done = AtomicU64::new(0);
         let [from, to] = self.part;
         self.trial.tell(self.id, self.what, from);
@@ -46,6 +48,6 @@ impl Counting<'_> {
                     sums
                 },
             );
-        (done.into_inner() * BATCH, sums)
+        (done.into_inner() * self.batch, sums)
     }
 }

@@ -117,7 +117,7 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
             sets.push((format!("{name}, {}", place.name()), there));
         }
     }
-    let each = trial.pick(BATCH, 8 * BATCH, 1_000_000);
+    let (each, batch) = (trial.pick(512, 8 * BATCH, 1_000_000), trial.pick(256, BATCH, BATCH));
     let mut checks = Vec::new();
     for (number, (what, triangles)) in sets.iter().enumerate() {
         let part = [number, number + 1].map(|n| n as f64 / sets.len() as f64);
@@ -126,14 +126,14 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
         let bounds = Blas::build(triangles).bounds();
         let scale = (bounds.max * 0.5 - bounds.min * 0.5).max_element() * 1.5;
         let balls = Balls::new(triangles, 2.0 * scale);
-        let counting = Counting { trial, id: CASE.id, what, part };
-        let (rays, wrong) = counting.sum(each, makers.len(), |batch| {
-            let mut rng = Rng::numbered(trial.seed, batch);
+        let counting = Counting { trial, id: CASE.id, what, part, batch };
+        let (rays, wrong) = counting.sum(each, makers.len(), |number| {
+            let mut rng = Rng::numbered(trial.seed, number);
             let usable = |ray: &Ray| ray.direction != Vec3::ZERO;
             let rays: Vec<Ray> =
                 std::iter::repeat_with(|| aimed_ray(&mut rng, triangles, scale, bounds.center()))
                     .filter(usable)
-                    .take(BATCH as usize)
+                    .take(batch as usize)
                     .collect();
             // Triangles far from a ray's line are known to be missed; given hours all are asked.
             let all = trial.effort == crate::torture::Effort::Long;

@@ -155,7 +155,7 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
         let what = format!("{}, {}", family.name, place.name());
         let part = [number, number + 1].map(|n| n as f64 / sets.len() as f64);
         let all: Vec<Mutex<Shown>> = makers.iter().map(|_| Mutex::default()).collect();
-        let counting = Counting { trial, id: CASE.id, what: &what, part };
+        let counting = Counting { trial, id: CASE.id, what: &what, part, batch: BATCH };
         let (rays, _) = counting.sum(each, 0, |batch| {
             let mut rng = Rng::numbered(trial.seed, batch);
             let pairs: Vec<Pair> = (0..BATCH).map(|_| family.pair(&mut rng, place)).collect();

@@ -64,7 +64,7 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
             continue;
         }
         let part = [number, number + 1].map(|n| n as f64 / scenes.len() as f64);
-        let counting = Counting { trial, id: CASE.id, what, part };
+        let counting = Counting { trial, id: CASE.id, what, part, batch: BATCH };
         let (rays, leaks) = counting.sum(each, makers.len(), |batch| {
             let mut rng = Rng::numbered(trial.seed, batch + 1);
             let rays = outward(&mut rng, triangles, &origins, BATCH as usize);

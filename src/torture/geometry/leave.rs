@@ -5,10 +5,10 @@ use super::meshes::{Triangles, with_surface};
 use super::stage::ball;
 use crate::bvh::{Hit, Ray};
 use crate::scene::TriangleMesh;
-use crate::torture::oracle::{Rng, ask, side};
+use crate::torture::oracle::{Rng, ask};
 use crate::torture::{Case, Check, Place, Trial};
 use crate::trace::surface::Interaction;
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, DVec3, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
 
 /// Where a ray toward a direction starts from a surface.
@@ -46,11 +46,12 @@ fn start(alone: &Alone, rng: &mut Rng, number: u32, direction: impl Fn(Vec3) -> 
 }
 
 /// Rays from points of one triangle: half without an end, half to points of any size with `t_max` 1 (pbrt's tests
-/// `Triangle.Reintersect`), of which it is certain on what side of the triangle's plane they are.
+/// `Triangle.Reintersect`), but none to the triangle's plane.
 #[must_use]
 pub fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec<Ray> {
     let mut rays = Vec::with_capacity(count);
     let placed = *alone.geometry.tlas.placements()[0].world_from_local();
+    let corners = alone.geometry.instances[0].mesh.corners(0).map(|p| placed.transform_point3(p.as_dvec3()));
     while rays.len() < count {
         let endless = rays.len() < count / 2;
         let target = Vec3::ZERO.map(|_| rng.decades(-8.0, 8.0));
@@ -62,15 +63,34 @@ pub fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec
         } else {
             Ray { origin, direction: target - origin, t_max: 1.0 }
         };
-        // A point in the plane of the triangle, as far as floats can tell, may be on the triangle.
-        let corners = alone.geometry.instances[0].mesh.corners(0);
-        let local = placed.inverse().transform_point3(target.as_dvec3()).as_vec3();
-        let apart = endless || side(&corners, local) != 0;
+        let apart = endless || is_apart(&corners, target, &spread(&placed, target, origin));
         if apart && ray.direction != Vec3::ZERO && ray.direction.is_finite() {
             rays.push(ray);
         }
     }
     rays
+}
+
+/// What the end of a ray is rounded in proportion to, along each axis: coordinates of both ends; and where they are
+/// turned on their way into the space of a mesh, their distances from its origin too.
+fn spread(placed: &DAffine3, target: Vec3, origin: Vec3) -> DVec3 {
+    let (target, origin) = (target.as_dvec3(), origin.as_dvec3());
+    if *placed == DAffine3::IDENTITY {
+        return target.abs() + origin.abs();
+    }
+    DVec3::splat(target.length() + origin.length() + 2.0 * placed.translation.length())
+}
+
+/// Whether the end of a ray is not in the plane of a triangle, as far as floats can tell: its floats and those of its
+/// origin and direction are rounded, so it ends somewhere within some ε of them. A ray that ends on the triangle may
+/// hit it.
+fn is_apart([a, b, c]: &[DVec3; 3], target: Vec3, spread: &DVec3) -> bool {
+    const EPSILON: f64 = 0.5 * f32::EPSILON as f64;
+    let (ab, ac, at) = (*b - *a, *c - *a, target.as_dvec3() - *a);
+    let normal = ab.cross(ac);
+    let products = ab.abs().yzx() * ac.abs().zxy() + ab.abs().zxy() * ac.abs().yzx();
+    let rounded = 8.0 * EPSILON * normal.abs().dot(*spread);
+    normal.dot(at).abs() > rounded + 8.0 * f64::EPSILON * products.dot(at.abs())
 }
 
 /// The case for any way of leaving a surface.

@@ -1,10 +1,10 @@
 //! Cases to look at: what leaks shines.
 
+use super::leaks;
 use super::leave::mesh;
 use super::meshes::{self, Triangles, bumpy_sphere};
 use super::stage::{WIDE, ball, cube, quad};
 use super::zero::Grid;
-use super::{leaks, worst};
 use crate::bvh::{Blas, Ray};
 use crate::load::Made;
 use crate::scene::{ActiveCamera, Camera, Instance, Light, Material, Mesh, Transform, TriangleMesh};
@@ -22,7 +22,6 @@ pub(super) const SHOWS: &[Made] = &[
     Made { name: "torture:G5-room", make: |world| room(world, false) },
     Made { name: "torture:G5-room-open", make: |world| room(world, true) },
     Made { name: "torture:G9", make: floors },
-    Made { name: "torture:G10", make: needles },
     Made { name: "torture:G11", make: machine },
 ];
 
@@ -144,21 +143,6 @@ fn floors(world: &mut World) -> Vec<String> {
     shine(world, Vec3::new(0.0, 1.7, 0.0), 0.1, 40.0);
     look(world, Vec3::new(0.2, 1.4, 0.9), Vec3::new(0.0, 0.2, 0.0));
     vec!["floors of three colours in one place: one of them is seen, everywhere".to_owned()]
-}
-
-/// G10: needles along a diagonal.
-fn needles(world: &mut World) -> Vec<String> {
-    let needles = worst::kinds(20_000).into_iter().find(|(name, _)| *name == "needles");
-    add(
-        world,
-        mesh(&needles.map_or_else(Triangles::new, |(_, t)| t)),
-        Material::default(),
-        DAffine3::IDENTITY,
-    );
-    shine(world, Vec3::new(40.0, 80.0, 0.0), 8.0, 60.0);
-    outside(world, 0.3);
-    look(world, Vec3::new(60.0, 20.0, -40.0), Vec3::ZERO);
-    vec!["needles, whose boxes are mostly empty: split before building".to_owned()]
 }
 
 /// G11: instances turned, stretched and mirrored.

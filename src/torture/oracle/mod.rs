@@ -21,4 +21,4 @@ pub use exact::Exact;
 pub use rng::Rng;
 pub use textbook::moller_trumbore;
 pub use tracer::{Answers, Maker, Tracer, ask, kernels};
-pub use truth::{Truth, side, truth};
+pub use truth::{Truth, truth};

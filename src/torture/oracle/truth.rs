@@ -84,19 +84,6 @@ pub fn truth(ray: &Ray, corners: &[Vec3; 3]) -> Truth {
     Truth { inside, t, certain, condition: normal_size.dot(d.abs()) / along.value().abs() }
 }
 
-/// On which side of a triangle's plane a point is, in exact arithmetic: 1 where the triangle is counter-clockwise,
-/// and 0 where the margin is below 8 ε of the products.
-#[must_use]
-pub fn side(corners: &[Vec3; 3], point: Vec3) -> i32 {
-    let exact = |p: Vec3| p.to_array().map(Exact::from);
-    let [a, b, c] = corners.map(exact);
-    let (ab, ac, ap) = (subtract(&b, &a), subtract(&c, &a), subtract(&exact(point), &a));
-    let height = dot(&cross(&ab, &ac), &ap);
-    let (e, f) = (rounded(&ab).abs(), rounded(&ac).abs());
-    let size = (e.yzx() * f.zxy() + e.zxy() * f.yzx()).dot(rounded(&ap).abs());
-    if height.value().abs() > 8.0 * EPSILON * size { height.sign() } else { 0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,9 +104,6 @@ mod tests {
         assert!(down(0.3, 0.3).inside && down(0.3, 0.3).certain);
         let behind = truth(&Ray::new(Vec3::new(0.3, 0.3, -1.0), Vec3::NEG_Z), &corners);
         assert!(behind.inside && behind.t == -1.0 && behind.certain, "{behind:?}");
-        assert_eq!(side(&corners, Vec3::new(0.2, 0.2, 1e-3)), 1);
-        assert_eq!(side(&corners, Vec3::new(9.0, 0.2, -1e-3)), -1);
-        assert_eq!(side(&corners, Vec3::new(0.2, 0.2, 0.0)), 0);
         let in_plane = truth(&Ray::new(Vec3::new(-1.0, 0.3, 0.0), Vec3::X), &corners);
         assert!(!in_plane.inside && in_plane.t.is_nan(), "{in_plane:?}");
     }
