@@ -12,7 +12,7 @@ pub(super) const RAYS: Case = Case {
     id: "C1",
     title: "fields of view of 1e-6 and 179.9 degrees, parallel rays, 1 x 1 and 7 x 3 pixels, up along the view",
     limit: "directions finite, unit within 2 ulp, and within 4 ε of f64",
-    run: |trial| rays(trial, |viewpoint, point, size| viewpoint.ray(point, size)),
+    run: |trial| rays(trial, Viewpoint::ray),
 };
 
 pub(super) const PLACES: Case = Case {

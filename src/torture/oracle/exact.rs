@@ -155,6 +155,6 @@ mod tests {
     fn a_cancelling_difference_of_products_is_exact() {
         let [a, b, c, d] = [33962.035f32, -30438.8, -24871.969, 41563.4].map(Exact::from);
         let exact = (&(&a * &b) - &(&c * &d)).value();
-        assert!((exact + 75.1656).abs() < 1e-3 || (exact - 75.1656).abs() < 1e-3, "{exact}");
+        assert!((exact + 75.1656).abs() < 1e-3, "{exact}");
     }
 }
