@@ -3,91 +3,11 @@
 #[path = "support/geometry.rs"]
 mod geometry;
 
-use geometry::balls::Balls;
-use geometry::{
-    Rng, aimed_ray, ask, brute_force, brute_force_in, check, long, same_as_brute_force, scenes, shared, soup,
-};
-use glam::{DVec3, Vec3};
+use geometry::{Balls, Rng, aimed_ray, ask, brute_force, brute_force_in, check, long, scenes, shared, soup};
+use glam::Vec3;
 use penumbra::bvh::{Blas, Isa, Ray};
 use proptest::prelude::*;
 use rayon::prelude::*;
-
-#[test]
-fn closest_hit_agrees_with_brute_force() {
-    for (count, size) in [(1, 1.0), (2, 1.0), (5, 0.5), (100, 0.3), (3000, 0.1), (300, 3.0)] {
-        same_as_brute_force(&format!("{count} triangles of {size}"), &soup(count, size, 3), 2000);
-    }
-}
-
-#[test]
-fn pathological_geometry_agrees_with_brute_force_and_keeps_its_bounds() {
-    let mut rng = Rng(11);
-    let fan: Vec<_> = (0..2000).map(|_| [Vec3::ZERO, rng.vec(), rng.vec()]).collect();
-    let equal = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 1000];
-    let concentric: Vec<_> = (1..1000)
-        .map(|i| {
-            let s = i as f32;
-            [Vec3::new(-s, -s, 0.0), Vec3::new(s, -s, 0.0), Vec3::new(0.0, 2.0 * s, 0.0)]
-        })
-        .collect();
-    let shrinking: Vec<_> = (0..=120)
-        .map(|k| {
-            let s = (-(k as f32)).exp2();
-            [Vec3::splat(s), Vec3::new(1.5 * s, s, s), Vec3::new(s, 1.5 * s, 2.0 * s)]
-        })
-        .collect();
-    let needles: Vec<_> = (0..2000)
-        .map(|_| {
-            let p = rng.vec() * 10.0;
-            [p - Vec3::ONE * 50.0, p + Vec3::ONE * 50.0, p + Vec3::ONE * 50.0 + rng.vec() * 1e-3]
-        })
-        .collect();
-    let line: Vec<_> = (0..40)
-        .map(|k| {
-            let x = 10f32.powi(k % 20 - 10) * if k < 20 { 1.0 } else { -1.0 };
-            [Vec3::X * x, Vec3::X * x + Vec3::Y * 1e-3, Vec3::X * x + Vec3::Z * 1e-3]
-        })
-        .collect();
-    let flat: Vec<_> = soup(500, 0.2, 5).into_iter().map(|t| t.map(|p| p.with_y(0.25))).collect();
-    let mut mixed = soup(500, 1e-4, 9);
-    mixed.push([Vec3::new(-1e6, 0.0, -1e6), Vec3::new(1e6, 0.0, -1e6), Vec3::new(0.0, 0.0, 1e6)]);
-    let mut far_vertex = soup(100, 0.2, 2);
-    far_vertex.push([Vec3::ZERO, Vec3::X, Vec3::Y * 3e38]);
-    for (name, triangles) in [
-        ("fan", fan),
-        ("equal", equal),
-        ("concentric", concentric),
-        ("shrinking", shrinking),
-        ("needles", needles),
-        ("line", line),
-        ("flat", flat),
-        ("mixed scales", mixed),
-        ("far vertex", far_vertex),
-    ] {
-        same_as_brute_force(name, &triangles, 1000);
-    }
-}
-
-#[test]
-fn far_and_small_scenes_agree_with_brute_force() {
-    for scale in [1e-3, 1.0, 1e3] {
-        for shift in
-            [Vec3::ZERO, Vec3::splat(1e3), Vec3::splat(1e5), Vec3::new(148_376.0, 1234.0, -223_423.0)]
-        {
-            let mut triangles: Vec<_> =
-                soup(400, 0.3, 21).into_iter().map(|t| t.map(|p| p * scale + shift)).collect();
-            // Rounded to f32 some collapse to a line, which has no surface.
-            triangles.retain(|t| {
-                let [a, b, c] = t.map(Vec3::as_dvec3);
-                (b - a).cross(c - a) != DVec3::ZERO
-            });
-            if triangles.len() < 10 {
-                continue;
-            }
-            same_as_brute_force(&format!("scale {scale}, shift {shift}"), &triangles, 1000);
-        }
-    }
-}
 
 /// From so far away that triangles are tested in double precision, together with nearer ones that are not.
 #[test]

@@ -3,8 +3,7 @@
 #[path = "support/geometry.rs"]
 mod geometry;
 
-use geometry::containment::check_hierarchy;
-use geometry::{Rng, aimed_ray, boxes, brute_force, check, place, soup};
+use geometry::{Rng, aimed_ray, boxes, brute_force, check, check_hierarchy, place, soup};
 use glam::{DAffine3, Vec3};
 use penumbra::bvh::inspect::Order;
 use penumbra::bvh::wide::{Child, WIDTH};

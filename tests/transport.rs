@@ -1,18 +1,15 @@
-//! Energy on its way from surface to surface: self-intersection, two estimators of one thing, lights of no use.
+//! Energy on its way from surface to surface: two estimators of one thing, lights of no use.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
     reason = "a test shows its figures, and fails at the first wrong one"
 )]
 
-#[path = "support/alone.rs"]
-mod alone;
 #[path = "support/stage.rs"]
 mod stage;
 
-use alone::Alone;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
-use penumbra::bvh::{Hit, Isa, Ray};
+use penumbra::bvh::Ray;
 use penumbra::scene::{Glossy, Light, Material, TriangleMesh};
 use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::light::FlatLight;
@@ -201,132 +198,6 @@ fn a_closed_room_is_exactly_dark_whatever_shines_outside() {
             let film = stage.trace(32);
             assert!(reds(film).iter().all(|&r| r == 0.0), "scale {scale}, shift {shift}, {integrator:?}");
         }
-    }
-}
-
-/// Rays that leave random points of the triangle on the side of the eye: how many come back to it.
-fn returns(alone: &Alone, rng: &mut Rng, points: u32, rays: u32) -> (u32, u32) {
-    let tlas = &alone.geometry.tlas;
-    let (mut tried, mut back) = (0, 0);
-    for _ in 0..points {
-        let s = rng.unit().sqrt();
-        let v = s * rng.unit();
-        let hit = Hit { t: 1.0, u: (1.0 - s).max(0.0), v, triangle: 0, instance: 0 };
-        // The side does not depend on where the ray began.
-        let at = alone.at(&hit, &Ray::new(Vec3::ZERO, rng.direction()));
-        for _ in 0..rays {
-            let mut direction = rng.direction();
-            if at.geometric_normal.dot(direction) < 0.0 {
-                direction = -direction;
-            }
-            let origin = at.origin_toward(direction);
-            back += u32::from(tlas.any_hit(&Ray::new(origin, direction)));
-            tried += 1;
-            // To a far and a near point, as shadow rays go.
-            let size = rng.decades(-8.0, 8.0).abs();
-            let target = at.position + direction * size;
-            let toward = target - origin;
-            if toward.is_finite() && at.geometric_normal.dot(toward) > 0.0 {
-                back += u32::from(tlas.any_hit(&Ray { origin, direction: toward, t_max: 1.0 }));
-                tried += 1;
-            }
-        }
-    }
-    (tried, back)
-}
-
-/// Height over longest side, twice: 1 and more for a good triangle, next to 0 for a needle.
-fn roundness([a, b, c]: [Vec3; 3]) -> f64 {
-    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    2.0 * (b - a).cross(c - a).length() / longest
-}
-
-#[test]
-fn no_ray_comes_back_to_the_triangle_it_leaves() {
-    let mut rng = Rng(3);
-    let kernels = Isa::available();
-    let (mut tried, mut back) = ([0; 2], [0; 2]);
-    for i in 0..2000 {
-        let mut coordinate = || rng.decades(-8.0, 8.0);
-        // Half of them with sixteen orders of magnitude between their coordinates, half of one size.
-        let corners = if i % 2 == 0 {
-            [0; 3].map(|_| Vec3::new(coordinate(), coordinate(), coordinate()))
-        } else {
-            let (size, center) = (rng.decades(-8.0, 8.0), rng.vec());
-            [0; 3].map(|_| (center + rng.vec()) * size)
-        };
-        let mesh =
-            TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
-        let Some(mut alone) = Alone::new(mesh, HERE) else {
-            continue;
-        };
-        alone.geometry.tlas = alone.geometry.tlas.with_isa(kernels[i % kernels.len()]);
-        let needle = usize::from(roundness(corners) < 1e-4);
-        let (t, b) = returns(&alone, &mut rng, 20, 50);
-        tried[needle] += t;
-        back[needle] += b;
-    }
-    println!("{} of {} came back; of needles {} of {}", back[0], tried[0], back[1], tried[1]);
-    assert!(tried[0] > 1_000_000 && tried[1] > 100_000);
-    assert_eq!(back, [0, 0]);
-}
-
-#[test]
-fn no_ray_comes_back_to_the_placed_triangle_it_leaves() {
-    let mut rng = Rng(4);
-    let kernels = Isa::available();
-    let (mut tried, mut back) = (0, 0);
-    for i in 0..1000 {
-        let corners = [0; 3].map(|_| rng.vec());
-        let mesh =
-            TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
-        let scale = DVec3::new(0.0, 0.0, 0.0).map(|_| f64::from(rng.decades(-4.0, 4.0)));
-        let at = DVec3::ZERO.map(|_| f64::from(rng.decades(-4.0, 4.0)));
-        let place = DAffine3::from_scale_rotation_translation(scale, rng.rotation(), at);
-        let Some(mut alone) = Alone::new(mesh, place) else {
-            continue;
-        };
-        alone.geometry.tlas = alone.geometry.tlas.with_isa(kernels[i % kernels.len()]);
-        let (t, b) = returns(&alone, &mut rng, 20, 50);
-        (tried, back) = (tried + t, back + b);
-    }
-    println!("{back} of {tried} came back");
-    assert_eq!(back, 0);
-}
-
-#[test]
-fn a_ray_does_not_leap_over_a_narrow_gap() {
-    // Two unit squares, the upper one `gap` above; shadow rays from the lower one go up through it.
-    let smallest = 2f32.powi(-14);
-    for (shift, smallest) in [(0.0, smallest), (1.0, smallest), (1e3, 64.0 * 6.1e-5), (1e5, 64.0 * 7.8e-3)] {
-        let mut rng = Rng(9);
-        let mut works = f32::INFINITY;
-        for power in 1..30 {
-            let gap = 2f32.powi(-power);
-            let at = Vec3::splat(shift);
-            let mut mesh = quad(at, Vec3::X, Vec3::Y);
-            let upper = quad(at + Vec3::new(-1.0, -1.0, gap), Vec3::X * 3.0, Vec3::Y * 3.0);
-            if upper.positions[0].z == at.z {
-                break;
-            }
-            mesh.positions.extend(upper.positions);
-            mesh.triangles.extend([[4, 5, 6], [4, 6, 7]]);
-            let alone = Alone::new(mesh, HERE).unwrap();
-            let blocked = (0..2000).all(|_| {
-                let (u, v) = (rng.unit() * 0.8 + 0.1, rng.unit() * 0.1);
-                let hit = Hit { t: 1.0, u, v: v.min(1.0 - u), triangle: 0, instance: 0 };
-                let from = alone.at(&hit, &Ray::new(Vec3::ZERO, -Vec3::Z));
-                let toward = Vec3::new(rng.unit() - 0.5, rng.unit() - 0.5, 1.0) * 1e-2 + Vec3::Z;
-                alone.geometry.tlas.any_hit(&Ray::new(from.origin_toward(toward), toward))
-            });
-            if !blocked {
-                break;
-            }
-            works = gap;
-        }
-        println!("at {shift}: gaps down to {works:.2e} are seen, {smallest:.2e} asked for");
-        assert!(works <= smallest, "at {shift}: {works} > {smallest}");
     }
 }
 

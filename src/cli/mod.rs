@@ -77,6 +77,12 @@ pub struct TortureArgs {
     /// Name the cases and what must hold
     #[arg(long)]
     pub list: bool,
+    /// Look at the scene of this case, such as G1, in the window or, without a display, as a picture
+    #[arg(long, value_name = "ID", conflicts_with = "case")]
+    pub show: Option<String>,
+    /// Show what it looks like when it breaks
+    #[arg(long, requires = "show")]
+    pub open_edge: bool,
     /// Print every check as JSON
     #[arg(long)]
     pub json: bool,
@@ -476,6 +482,9 @@ impl SceneArgs {
     /// # Errors
     /// If it is neither a file nor built in.
     pub fn source(&self) -> Result<SceneSource, LoadError> {
+        if let Some(made) = crate::torture::shown(&self.scene) {
+            return Ok(SceneSource::Made(made));
+        }
         SceneSource::parse(&self.scene)
     }
 

@@ -17,6 +17,7 @@ mod framing;
 mod geometry;
 mod gltf;
 mod ktx2;
+mod made;
 mod obj;
 mod picture;
 mod report;
@@ -28,10 +29,11 @@ pub use builtin::{BuiltIn, built_in_scenes};
 pub use card::{Card, Verdict};
 pub use error::{LoadError, ReadError};
 pub(crate) use framing::{ADDED_LIGHT, light_for};
+pub use made::Made;
 pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
-use crate::scene::{Playing, Transform, deform, play, propagate_transforms};
+use crate::scene::{ActiveCamera, Playing, Transform, deform, play, propagate_transforms};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
@@ -48,6 +50,8 @@ pub enum SceneSource {
     File(PathBuf),
     /// Name of a scene that is compiled into the program.
     BuiltIn(&'static str),
+    /// What a function makes.
+    Made(Made),
 }
 
 impl SceneSource {
@@ -77,6 +81,8 @@ impl SceneSource {
                 .file_stem()
                 .map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
             Self::BuiltIn(name) => (*name).to_owned(),
+            // Names of files have no colons on some machines.
+            Self::Made(made) => made.name.replace(':', "-"),
         }
     }
 }
@@ -87,6 +93,7 @@ impl fmt::Display for SceneSource {
         match self {
             Self::File(path) => path.display().fmt(f),
             Self::BuiltIn(name) => f.write_str(name),
+            Self::Made(made) => f.write_str(made.name),
         }
     }
 }
@@ -126,6 +133,10 @@ pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> R
 }
 
 fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+    if let SceneSource::Made(made) = source {
+        make(made, sink);
+        return Ok(());
+    }
     let (file, folder, bytes) = open(source, sink)?;
     let format = Format::of(&file, &bytes)?;
     let mut settings = Vec::new();
@@ -166,6 +177,18 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     sink.count();
     framing::complete(&file, active, sink);
     Ok(())
+}
+
+/// What needs no file. Nothing can go wrong.
+fn make(made: &Made, sink: &mut Sink<'_>) {
+    for line in (made.make)(sink.world) {
+        sink.decide(made.name, line);
+    }
+    sink.begin(Phase::Framing);
+    pose(sink.world);
+    sink.count();
+    let active = sink.world.get_resource::<ActiveCamera>().map(|active| active.0);
+    framing::complete(made.name, active, sink);
 }
 
 /// Brings meshes into the shape that their weights and joints, animated or not, ask for.
@@ -215,6 +238,7 @@ fn open(source: &SceneSource, sink: &Sink<'_>) -> Result<(String, Folder, Bytes)
             let (file, bytes) = found.ok_or_else(|| builtin::unknown(name))?;
             Ok((file.to_owned(), Folder::BuiltIn, Bytes::Borrowed(bytes)))
         }
+        SceneSource::Made(made) => Err(builtin::unknown(made.name)),
     }
 }
 

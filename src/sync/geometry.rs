@@ -9,22 +9,27 @@ use bevy_ecs::prelude::*;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Picks [`RenderOrigin`] when the first geometry is there: the scene's middle, rounded to a multiple of a
-/// power of two not below its extent, so that a scene around the origin stays where it is.
+/// Picks [`RenderOrigin`] when the first geometry is there: the scene's middle, in steps of a power of two not
+/// below its extent from where the first instance is. So a scene around the origin stays where it is, and one
+/// that is moved as a whole has the same coordinates again, to the bit.
 pub fn choose_origin(
     mut origin: ResMut<RenderOrigin>,
-    instances: Query<(&Instance, &GlobalTransform)>,
+    instances: Query<(Entity, &Instance, &GlobalTransform)>,
     meshes: Query<&MeshBlas>,
 ) {
     if origin.0.is_some() || instances.is_empty() {
         return;
     }
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for (instance, global) in &instances {
+    let mut first: Option<(Entity, DVec3)> = None;
+    for (entity, instance, global) in &instances {
         let Ok(MeshBlas(blas)) = meshes.get(instance.mesh) else { continue };
         let bounds = blas.bounds();
         if bounds.is_empty() {
             continue;
+        }
+        if first.is_none_or(|(before, _)| entity < before) {
+            first = Some((entity, global.0.translation));
         }
         for corner in [bounds.min, bounds.max] {
             let p = global.0.transform_point3(corner.as_dvec3());
@@ -37,7 +42,9 @@ pub fn choose_origin(
     let extent = (high - low).max_element();
     let finite = low.is_finite() && high.is_finite();
     let grid = if extent > 0.0 { extent.log2().ceil().exp2() } else { 1.0 };
-    origin.0 = Some(if finite { ((low + high) * (0.5 / grid)).round() * grid } else { DVec3::ZERO });
+    let from = first.map_or(DVec3::ZERO, |(_, place)| place);
+    let steps = ((low + high) * 0.5 - from) / grid;
+    origin.0 = Some(if finite { from + steps.round() * grid } else { DVec3::ZERO });
 }
 
 /// Builds the TLAS anew when an instance came, went, moved or changed its mesh or materials.

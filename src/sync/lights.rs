@@ -61,6 +61,16 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
     if !placed.is_finite() {
         return None;
     }
+    let is_off = match light {
+        Light::Point { intensity } | Light::Spot { intensity, .. } => *intensity == Vec3::ZERO,
+        Light::Directional { irradiance, .. } => *irradiance == Vec3::ZERO,
+        Light::Segment { strength, .. } => *strength == [Vec3::ZERO; 2],
+        // Those below ask for themselves.
+        _ => false,
+    };
+    if is_off {
+        return None;
+    }
     let position = placed.translation.as_vec3();
     let vector = |v: Vec3| placed.transform_vector3(v.as_dvec3()).as_vec3();
     let axis = || vector(Vec3::NEG_Z).try_normalize();

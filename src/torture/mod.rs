@@ -5,8 +5,9 @@
 //! it must keep. Limits are those of theory (zero leaks, so many ulp, 4.5 standard errors), not of what
 //! was measured.
 
-mod geometry;
+pub mod geometry;
 pub mod light;
+pub mod oracle;
 mod place;
 pub mod stage;
 mod table;
@@ -16,6 +17,7 @@ pub use place::Place;
 pub use table::{json, markdown, rows};
 pub use trial::{Effort, Step, Trial};
 
+use crate::load::Made;
 use serde::Serialize;
 
 /// One way to break.
@@ -109,6 +111,18 @@ impl Tried {
 #[must_use]
 pub fn cases() -> Vec<Case> {
     [geometry::CASES, light::CASES].concat()
+}
+
+/// The scene of that name, `torture:G1` or, as it looks when it breaks, `torture:G1-open`.
+#[must_use]
+pub fn shown(name: &str) -> Option<Made> {
+    shows().into_iter().find(|made| made.name.eq_ignore_ascii_case(name))
+}
+
+/// All scenes that can be looked at.
+#[must_use]
+pub fn shows() -> Vec<Made> {
+    geometry::SHOWS.to_vec()
 }
 
 /// Runs `case`.

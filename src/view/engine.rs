@@ -215,7 +215,7 @@ impl<W: Fn(Wake)> Engine<W> {
     fn watch(&self, app: &App) -> Files {
         let origin = app.world.get_resource::<SceneOrigin>();
         let watch = origin.and_then(|origin| match &origin.source {
-            SceneSource::BuiltIn(_) => None,
+            SceneSource::BuiltIn(_) | SceneSource::Made(_) => None,
             SceneSource::File(path) => {
                 let (own, interrupt) = (self.own.clone(), Arc::clone(&self.interrupt));
                 Some(SceneWatch::new(path, move || {

@@ -24,6 +24,7 @@ pub fn recipe(world: &World) -> Recipe {
             std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string()
         }
         SceneSource::BuiltIn(name) => (*name).to_owned(),
+        SceneSource::Made(made) => made.name.to_owned(),
     };
     let mut arguments = vec![scene];
     let mut add = |flag: &str, value: String| arguments.extend([flag.to_owned(), value]);

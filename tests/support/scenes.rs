@@ -4,7 +4,6 @@ use bevy_ecs::prelude::*;
 use glam::{DAffine3, Vec3};
 use penumbra::load::{LoadOptions, SceneSource, load};
 use penumbra::scene::{GlobalTransform, Instance, Mesh, TriangleMesh};
-use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -25,18 +24,4 @@ pub fn triangles(file: &Path) -> Vec<[Vec3; 3]> {
         (0..mesh.triangles.len()).map(|i| mesh.corners(i).map(placed)).collect::<Vec<_>>()
     };
     placed_meshes(file).into_iter().flat_map(corners).collect()
-}
-
-/// Whether every edge has two faces, which go along it in opposite directions. Corners at the same place are
-/// the same.
-pub fn is_closed(triangles: &[[Vec3; 3]]) -> bool {
-    // With 0 added -0 is 0.
-    let place = |p: Vec3| (p + 0.0).to_array().map(f32::to_bits);
-    let mut faces: HashMap<_, i32> = HashMap::new();
-    for corners in triangles {
-        for i in 0..3 {
-            *faces.entry((place(corners[i]), place(corners[(i + 1) % 3]))).or_default() += 1;
-        }
-    }
-    faces.iter().all(|(&(a, b), &count)| count == 1 && faces.get(&(b, a)) == Some(&1))
 }

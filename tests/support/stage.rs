@@ -2,10 +2,8 @@
 #![allow(dead_code, unused_imports, reason = "each test file uses its part")]
 #![allow(clippy::print_stdout, reason = "a test shows its figures")]
 
-mod rng;
-
+pub use penumbra::torture::oracle::Rng;
 pub use penumbra::torture::stage::*;
-pub use rng::Rng;
 
 use penumbra::app::{FrameBudget, FrameStats};
 use penumbra::trace::Film;

@@ -3,7 +3,9 @@
 use crate::bar::Bar;
 use crate::exit;
 use crate::signal::{set_threads, stop_on_signals};
-use penumbra::cli::TortureArgs;
+use crate::window;
+use clap::Parser;
+use penumbra::cli::{Cli, TortureArgs};
 use penumbra::torture::{self, Case, Effort, Trial, Tried};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -21,6 +23,9 @@ pub fn run(args: &TortureArgs) -> u8 {
         Ok(cases) => cases,
         Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
     };
+    if let Some(id) = &args.show {
+        return show(id, args.open_edge);
+    }
     set_threads(args.threads);
     let interrupt = Arc::new(AtomicBool::new(false));
     stop_on_signals(&interrupt);
@@ -57,6 +62,20 @@ pub fn run(args: &TortureArgs) -> u8 {
         0
     } else {
         exit::ABOVE_LIMIT
+    }
+}
+
+/// Opens the window on a case's scene.
+fn show(id: &str, open: bool) -> u8 {
+    let name = format!("torture:{id}{}", if open { "-open" } else { "" });
+    if torture::shown(&name).is_none() {
+        let names: Vec<&str> = torture::shows().iter().map(|made| made.name).collect();
+        let error = format!("--show {id}: there is no {name} to look at; there are {}", names.join(", "));
+        return exit::because(&error, exit::BAD_COMMAND_LINE);
+    }
+    match Cli::try_parse_from(["penumbra", &name]) {
+        Ok(cli) => window::run(&cli.window),
+        Err(error) => exit::because(&error, exit::BAD_COMMAND_LINE),
     }
 }
 

@@ -97,6 +97,7 @@ fn write(world: &World, editor: &Editor) -> Result<String, String> {
                 let scene = match &origin.source {
                     SceneSource::File(scene) => scene.display().to_string(),
                     SceneSource::BuiltIn(name) => (*name).to_owned(),
+                    SceneSource::Made(made) => made.name.to_owned(),
                 };
                 let path = path.strip_prefix(".").unwrap_or(&path);
                 return Ok(format!("{scene} --scene-settings {} {}", path.display(), look(world)));

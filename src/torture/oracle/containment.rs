@@ -1,8 +1,8 @@
 //! Whether a hierarchy holds all of every triangle, in however many parts.
 
+use crate::bvh::wide::{Child, WIDTH};
+use crate::bvh::{Aabb, Blas, WideBvh};
 use glam::{DVec3, Vec3};
-use penumbra::bvh::wide::{Child, WIDTH};
-use penumbra::bvh::{Aabb, Blas, WideBvh};
 use rayon::prelude::*;
 
 /// Points inside of a triangle, no two with the same weight of a corner; and on each edge, with its ends.
@@ -13,11 +13,17 @@ const ON_EDGE: usize = 20;
 ///
 /// A triangle in one leaf must be inside its box, exactly. Of one that was split, each of 160 points
 /// must be inside the box of one of its leaves.
+///
+/// # Errors
+/// What the first defect is.
 pub fn check(blas: &Blas, triangles: &[[Vec3; 3]]) -> Result<(), String> {
     check_hierarchy(blas.hierarchy(), triangles)
 }
 
 /// The same of a hierarchy that need not be a [`Blas`]'s.
+///
+/// # Errors
+/// What the first defect is.
 pub fn check_hierarchy(hierarchy: &WideBvh, triangles: &[[Vec3; 3]]) -> Result<(), String> {
     hierarchy.check(None).map_err(|defect| defect.to_string())?;
     // For each entry of `prims` the box of its leaf.

@@ -1,8 +1,8 @@
 //! Brute force in a fraction of the time: triangles far away from a ray's line need not be asked.
 
-use super::brute_force_among;
+use super::brute::brute_force_among;
+use crate::bvh::{Aabb, Hit, Ray};
 use glam::Vec3;
-use penumbra::bvh::{Aabb, Hit, Ray};
 
 /// A ball around each triangle.
 pub struct Balls {
@@ -12,6 +12,7 @@ pub struct Balls {
 
 impl Balls {
     /// Larger by a ten thousandth of `size`: some thousand times as much as anything rounds.
+    #[must_use]
     pub fn new(triangles: &[[Vec3; 3]], size: f32) -> Self {
         let centers: Vec<Vec3> = triangles.iter().map(|t| t.iter().sum::<Vec3>() / 3.0).collect();
         let reach = |(t, &center): (&[Vec3; 3], &Vec3)| {
@@ -25,6 +26,7 @@ impl Balls {
     }
 
     /// As trying all does.
+    #[must_use]
     pub fn brute_force(&self, bounds: &Aabb, triangles: &[[Vec3; 3]], ray: &Ray) -> Option<Hit> {
         let near = self.near(ray).into_iter().map(|number| (number, &triangles[number as usize]));
         brute_force_among(bounds, near, ray)

@@ -1,0 +1,4 @@
+//! The torture chamber's cases hold, and every checker finds who does it wrong.
+
+mod geometry;
+mod show;
