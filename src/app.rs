@@ -1,9 +1,10 @@
 //! The World and the one list of systems.
 
-use crate::image::develop::{Display, Picture, develop};
+use crate::image::develop::{Display, Picture};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::{Playing, deform, play, propagate_transforms};
+use crate::shown::{Shown, develop_film, keep};
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin, Traceable};
 use crate::trace::noise;
 use crate::trace::{
@@ -114,6 +115,7 @@ impl App {
         world.init_resource::<Display>();
         world.init_resource::<Picture>();
         world.init_resource::<Preview>();
+        world.init_resource::<Shown>();
         world.init_resource::<FrameBudget>();
         world.init_resource::<FrameStats>();
         world.init_resource::<Geometry>();
@@ -204,7 +206,7 @@ fn frame_schedule() -> Schedule {
         )
             .chain()
             .in_set(Sync),
-        trace_frame.in_set(Trace),
+        (trace_frame, keep).chain().in_set(Trace),
         develop_film.run_if(is_worth_developing).in_set(Present),
     ));
     frame
@@ -285,19 +287,5 @@ pub fn trace_frame(
         stats.noise = noise.map(|noise| noise.relative);
         stats.noise_doubt = noise.map_or(0.0, |noise| noise.doubt);
         stats.noise_samples = complete;
-    }
-}
-
-/// Film → [`Picture`], when either it or the way of showing it has changed.
-pub fn develop_film(
-    film: Res<Film>,
-    preview: Res<Preview>,
-    display: Res<Display>,
-    mut picture: ResMut<Picture>,
-) {
-    if film.is_changed() || display.is_changed() {
-        picture.size = film.size();
-        picture.rgba = develop(&film, preview.film(), &display);
-        picture.version += 1;
     }
 }

@@ -18,6 +18,7 @@ pub mod lights;
 pub mod mesh_light;
 pub mod noise;
 pub mod pass;
+pub mod place;
 pub mod quad;
 pub mod sampler;
 pub mod scene;

@@ -1,0 +1,346 @@
+//! Samples of one view, found again in the next.
+//!
+//! Backward, from the new picture: where the surface of a pixel was in the old one, and whether that is what was
+//! seen there. Old samples keep the exact place that they are of, so that small errors do not add up from step to
+//! step. After B. Walter, G. Drettakis, S. Parker, "Interactive Rendering using the Render Cache", 1999, which goes
+//! forward, and D. Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007.
+
+use super::{MOST, Shown};
+use crate::trace::camera::Sheet;
+use crate::trace::place::{Place, places};
+use crate::trace::{Film, TraceScene};
+use glam::{UVec2, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+
+/// Surfaces count as the same up to an angle of this cosine, ...
+const ALIKE: f32 = 0.9;
+/// ... and up to a distance of so many pixels from the other one's plane.
+const NEAR: f32 = 4.0;
+/// Blocks of the new picture in whose middle one looks are as large as the preview's pixels, but no smaller and no
+/// larger than this: around it the surface is continued as a plane.
+const BLOCKS: [u32; 2] = [2, 4];
+/// If more of the blocks than this share see an edge, there is no time to look closer.
+const MOST_EDGES: f32 = 0.3;
+/// A preview that counts less than this share of the old samples is left out.
+const NOTABLE: f32 = 0.02;
+/// Old pixels that are worth less are left alone, samples.
+const LEAST: f32 = 1e-3;
+/// Pixels beside a pixel.
+const AROUND: [(f32, f32); 8] =
+    [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+
+/// The old picture, and the way into it.
+struct Old<'a> {
+    size: UVec2,
+    sheet: Sheet,
+    cells: &'a [Vec4],
+    places: &'a [Place],
+}
+
+/// A row of the new picture: rays as linear functions of x, in render space and in the old camera's own.
+struct Row {
+    origin: [Vec3; 2],
+    direction: [Vec3; 2],
+    old_origin: [Vec3; 2],
+    old_direction: [Vec3; 2],
+}
+
+impl Shown {
+    /// Makes `kept` and `places` those of `scene`'s viewpoint.
+    pub(super) fn carry(&mut self, scene: &TraceScene, preview: Option<&Film>) {
+        let Some(before) = self.viewpoint.replace(*scene.viewpoint) else { return };
+        let size = self.size;
+        let count = size.element_product() as usize;
+        if self.places.len() != count {
+            self.places.clear();
+            self.places.resize(count, Place::unknown());
+        }
+        let old_sheet = before.sheet(size);
+        // Those of a whole picture are marked already.
+        if self.exact_rows > 0 && !self.is_looked_at() {
+            mark_edges(&mut self.places, size, &old_sheet);
+        }
+        let new = scene.viewpoint.sheet(size);
+        let grid = Grid::new(scene, &new, preview);
+        self.kept.resize(count, Vec4::ZERO);
+        self.spare.resize(count, Place::unknown());
+        let old = Old { size, sheet: old_sheet, cells: &self.cells, places: &self.places };
+        let width = size.x as usize;
+        let carried: usize = self
+            .kept
+            .par_chunks_exact_mut(width)
+            .zip(self.spare.par_chunks_exact_mut(width))
+            .zip(0..size.y)
+            .map(|((kept, found), y)| carry_row(scene, &new, &old, &grid, y, kept, found))
+            .sum();
+        self.share = carried as f64 / count as f64;
+        std::mem::swap(&mut self.places, &mut self.spare);
+        self.exact_rows = 0;
+    }
+}
+
+/// Marks pixels that show more than one surface: what they show is of none of them.
+pub(super) fn mark_edges(places: &mut [Place], size: UVec2, sheet: &Sheet) {
+    let width = size.x as usize;
+    let differ = |a: &Place, b: &Place| {
+        let pixel = sheet.pixel(sheet.own(a.position).z.max(0.0));
+        !a.continues(b, 2.0 * pixel)
+    };
+    let mut edges = vec![false; places.len()];
+    edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
+        let at = |x: usize, y: usize| &places[y * width + x];
+        for (x, edge) in edges.iter_mut().enumerate() {
+            let here = at(x, y);
+            *edge = x > 0 && differ(here, at(x - 1, y))
+                || x + 1 < width && differ(here, at(x + 1, y))
+                || y > 0 && differ(here, at(x, y - 1))
+                || y + 1 < size.y as usize && differ(here, at(x, y + 1));
+        }
+    });
+    for (place, edge) in places.iter_mut().zip(edges) {
+        place.edge = edge;
+    }
+}
+
+/// The new picture in blocks, and its preview.
+struct Grid<'a> {
+    size: UVec2,
+    /// What is in the middle of each.
+    blocks: Vec<Place>,
+    /// Pixels of blocks that see an edge are looked at one by one.
+    exact: bool,
+    preview: Option<&'a Film>,
+    /// What a sample of the preview counts: it is of many pixels.
+    worth: f32,
+}
+
+impl<'a> Grid<'a> {
+    fn new(scene: &TraceScene, sheet: &Sheet, preview: Option<&'a Film>) -> Self {
+        let full = scene.settings.size;
+        let [least, most] = BLOCKS;
+        let side = preview.map_or(least, |film| (full.y / film.size().y).clamp(least, most));
+        let size = (full / side).max(UVec2::ONE);
+        let pitch = full.as_vec2() / size.as_vec2();
+        let width = size.x as usize;
+        let mut blocks = vec![Place::unknown(); width * size.y as usize];
+        blocks.par_chunks_exact_mut(width).zip(0..size.y).for_each(|(row, y)| {
+            let middles: Vec<Vec2> =
+                (0..size.x).map(|x| (Vec2::new(x as f32, y as f32) + 0.5) * pitch).collect();
+            places(scene, &middles, row);
+        });
+        // Planes must go on from block to block.
+        let mut edges = vec![false; blocks.len()];
+        edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
+            for (x, edge) in edges.iter_mut().enumerate() {
+                let here = &blocks[y * width + x];
+                let pixel = sheet.pixel(sheet.own(here.position).z.max(0.0));
+                let rows = y.saturating_sub(1)..(y + 2).min(size.y as usize);
+                let columns = x.saturating_sub(1)..(x + 2).min(width);
+                *edge = rows.into_iter().any(|y| {
+                    blocks[y * width..][columns.clone()].iter().any(|other| !here.continues(other, pixel))
+                });
+            }
+        });
+        let count = edges.iter().filter(|&&edge| edge).count();
+        for (block, edge) in blocks.iter_mut().zip(edges) {
+            block.edge = edge;
+        }
+        let worth =
+            preview.map_or(0.0, |film| film.size().element_product() as f32 / full.element_product() as f32);
+        Self { size, exact: count as f32 <= MOST_EDGES * blocks.len() as f32, blocks, preview, worth }
+    }
+
+    fn at(&self, x: u32, y: u32) -> &Place {
+        &self.blocks[(y * self.size.x + x) as usize]
+    }
+
+    /// What the preview shows at pixel (x, y) of a picture of `full` pixels.
+    fn own_color(&self, [x, y]: [u32; 2], full: UVec2) -> Vec3 {
+        self.preview.map_or(Vec3::ZERO, |film| {
+            let small = film.size();
+            film.pixel(x * small.x / full.x, y * small.y / full.y).mean().as_vec3()
+        })
+    }
+
+    /// What the preview shows at pixel (x, y) of a picture of `full` pixels, or beside it, of the surface at `place`.
+    fn color(&self, [x, y]: [u32; 2], full: UVec2, place: &Place, pixel: f32) -> Vec3 {
+        let Some(film) = self.preview else { return Vec3::ZERO };
+        let small = film.size();
+        let (u, v) = (x * small.x / full.x, y * small.y / full.y);
+        let color = |u: u32, v: u32| film.pixel(u, v).mean().as_vec3();
+        let is_it = |u: u32, v: u32| {
+            let middle = |i: u32, small: u32, blocks: u32| (2 * i + 1) * blocks / (2 * small);
+            let block = self.at(middle(u, small.x, self.size.x), middle(v, small.y, self.size.y));
+            place.continues(block, 8.0 * pixel)
+        };
+        if is_it(u, v) {
+            return color(u, v);
+        }
+        let rows = v.saturating_sub(1)..(v + 2).min(small.y);
+        let columns = u.saturating_sub(1)..(u + 2).min(small.x);
+        let mut around = rows.flat_map(|v| columns.clone().map(move |u| (u, v)));
+        let (u, v) = around.find(|&(u, v)| is_it(u, v)).unwrap_or((u, v));
+        color(u, v)
+    }
+}
+
+/// Fills in row `y`; returns how many pixels have old samples.
+fn carry_row(
+    scene: &TraceScene,
+    new: &Sheet,
+    old: &Old,
+    grid: &Grid<'_>,
+    y: u32,
+    kept: &mut [Vec4],
+    found: &mut [Place],
+) -> usize {
+    let row = Row::new(new, &old.sheet, y as f32 + 0.5);
+    let v = y * grid.size.y / old.size.y;
+    let block_of = |x: u32| x * grid.size.x / old.size.x;
+    let mut exact = Vec::new();
+    if grid.exact {
+        let at_edges: Vec<u32> = (0..old.size.x).filter(|&x| grid.at(block_of(x), v).edge).collect();
+        let middles: Vec<Vec2> =
+            at_edges.iter().map(|&x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
+        exact.resize(middles.len(), Place::unknown());
+        places(scene, &middles, &mut exact);
+    }
+    let mut exact = exact.into_iter();
+    let mut carried = 0;
+    for ((x, kept), found) in (0..old.size.x).zip(kept).zip(found) {
+        let block = grid.at(block_of(x), v);
+        let place = if block.edge { exact.next().unwrap_or(*block) } else { *block };
+        match row.find(new, old, x, y, &place) {
+            Some(hit) => {
+                let cell = old.cells[hit.index];
+                // At an edge the preview may be of another surface; beside many old samples it says nothing.
+                *kept = if block.edge || grid.worth < NOTABLE * hit.weight {
+                    cell.truncate().extend(hit.weight)
+                } else {
+                    let preview = grid.own_color([x, y], old.size);
+                    let sum = hit.weight + grid.worth;
+                    let radiance = (cell.truncate() * hit.weight + preview * grid.worth) / sum;
+                    radiance.extend(sum.min(MOST))
+                };
+                *found = Place { edge: false, ..old.places[hit.index] };
+                if let Some(moved) = hit.moved {
+                    found.position = moved;
+                }
+                carried += 1;
+            }
+            None => {
+                let (position, depth) = row.meet(x, &place).unwrap_or((place.position, 1.0));
+                let color = grid.color([x, y], old.size, &place, new.pixel(depth));
+                *kept = color.extend(grid.worth);
+                *found = Place { position, edge: false, ..place };
+            }
+        }
+    }
+    carried
+}
+
+/// An old pixel.
+struct Found {
+    index: usize,
+    /// How many samples it is worth.
+    weight: f32,
+    /// Where its light is taken to be of, if not of where it is.
+    moved: Option<Vec3>,
+}
+
+impl Row {
+    fn new(new: &Sheet, old: &Sheet, y: f32) -> Self {
+        let at = |[start, across, down]: [Vec3; 3]| [start + down * y + across * 0.5, across];
+        let (origin, direction) = (at(new.origin), at(new.direction));
+        Self {
+            origin,
+            direction,
+            old_origin: [old.own(origin[0]), old.axes * origin[1]],
+            old_direction: direction.map(|d| old.axes * d),
+        }
+    }
+
+    /// Where the ray of pixel `x` meets the plane of `place`, and how deep.
+    #[inline(always)]
+    fn meet(&self, x: u32, place: &Place) -> Option<(Vec3, f32)> {
+        let at = |[start, across]: [Vec3; 2]| start + across * x as f32;
+        let (origin, direction) = (at(self.origin), at(self.direction));
+        let t = place.facet.dot(place.position - origin) / place.facet.dot(direction);
+        // NaN where there is no plane.
+        (t > 0.0 && t.is_finite()).then(|| (origin + direction * t, t))
+    }
+
+    /// The old pixel that shows what pixel `x` shows if it is of the surface of `place`.
+    #[inline(always)]
+    fn find(&self, new: &Sheet, old: &Old, x: u32, y: u32, place: &Place) -> Option<Found> {
+        let at = |[start, across]: [Vec3; 2]| start + across * x as f32;
+        if place.thing == Place::NOTHING {
+            // Parallel rays see one point of what is infinitely far.
+            if !(new.perspective && old.sheet.perspective) {
+                return None;
+            }
+            let own = at(self.old_direction);
+            let index = old.index(old.sheet.place(own), own.z)?;
+            let there = &old.places[index];
+            let weight = old.cells[index].w.min(MOST);
+            let is_it = there.thing == Place::NOTHING && !there.edge && weight > LEAST;
+            return is_it.then_some(Found { index, weight, moved: None });
+        }
+        let (point, depth) = self.meet(x, place)?;
+        let own = at(self.old_origin) + at(self.old_direction) * depth;
+        let (pixel, old_pixel) = (new.pixel(depth), old.sheet.pixel(own.z));
+        let reach = NEAR * pixel.max(old_pixel);
+        let is_it = |index: usize| {
+            let there = &old.places[index];
+            there.thing == place.thing
+                && !there.edge
+                && there.facet.dot(place.facet) > ALIKE
+                && place.facet.dot(there.position - point).abs() <= reach
+        };
+        let middle = Vec2::new(x as f32, y as f32) + 0.5;
+        let off = |index: usize| new.place(new.own(old.places[index].position)) - middle;
+        // One old pixel for many new ones says less about each.
+        let spread = (pixel / old_pixel).min(1.0);
+        let near = 0.8 / spread;
+        let center = old.sheet.place(own);
+        let first = old.index(center, own.z)?;
+        let (mut index, mut moved) = (first, None);
+        let mut away = Vec2::INFINITY;
+        if is_it(first) {
+            away = off(first);
+        }
+        if away.abs().max_element() > near {
+            // It is of a place beside its pixel, or of several surfaces: a neighbour may be nearer.
+            for (dx, dy) in AROUND {
+                let Some(other) = old.index(center + Vec2::new(dx, dy), own.z).filter(|&i| is_it(i)) else {
+                    continue;
+                };
+                let its = off(other);
+                if its.length_squared() < away.length_squared() {
+                    (index, away) = (other, its);
+                }
+            }
+            // Beside an edge it may be of the next pixel.
+            if !(away.abs().max_element() <= 2.0 * near) {
+                return None;
+            }
+            moved = (away.abs().max_element() > near).then_some(point);
+        }
+        let keeps = f32::from(place.keeps.min(old.places[index].keeps));
+        let weight = old.cells[index].w.min(MOST).min(keeps) * (spread * spread);
+        (weight > LEAST).then_some(Found { index, weight, moved })
+    }
+}
+
+impl Old<'_> {
+    /// The pixel there.
+    #[inline(always)]
+    fn index(&self, at: Vec2, depth: f32) -> Option<usize> {
+        let inside = depth > 0.0
+            && at.x >= 0.0
+            && at.y >= 0.0
+            && at.x < self.size.x as f32
+            && at.y < self.size.y as f32;
+        inside.then(|| at.y as usize * self.size.x as usize + at.x as usize)
+    }
+}
