@@ -52,6 +52,8 @@ pub struct FrameBudget {
     pub sample_target: u32,
     /// Samples per pixel of one pass, if there is no time limit.
     pub pass_samples: u32,
+    /// Only this part of the picture is refined, from its first pixel to the one after its last.
+    pub region: Option<[UVec2; 2]>,
     /// For somebody who watches: a coarse whole picture first when the film was reset.
     pub preview: bool,
     /// For somebody who watches: a developed [`Picture`] at the end of each frame.
@@ -66,6 +68,7 @@ impl Default for FrameBudget {
             adaptive: false,
             sample_target: 64,
             pass_samples: 1,
+            region: None,
             preview: false,
             develop: false,
         }
@@ -93,6 +96,8 @@ pub struct FrameStats {
     pub rays_per_second: f64,
     /// Side of a preview pixel, if the picture is still partly a preview.
     pub preview_scale: Option<u32>,
+    /// Seconds that the last preview took.
+    pub preview_seconds: f64,
     /// Samples dropped because they were not finite.
     pub dropped: u64,
     /// Whether the last frame was the first one of this picture.
@@ -232,6 +237,10 @@ pub fn trace_frame(
     let target = budget.sample_target.min(u32::MAX - film.first_sample());
     let mut start = Instant::now();
     let mut seconds = 0.0;
+    // Not each time: it would count as a change of the film.
+    if film.region() != budget.region {
+        film.confine(budget.region);
+    }
     let mut rays = RayCounts::default();
     // Once for each reset: a preview that came anew each frame would leave no time for anything else.
     stats.begun = std::mem::replace(&mut *previewed, redone.resets) != redone.resets;
@@ -243,11 +252,14 @@ pub fn trace_frame(
                 Some(counts) => rays = rays + counts,
                 // So cheap that the film's own first pass is the preview.
                 None => {
+                    film.confine(None);
                     rays = rays + trace_pass(&scene, &mut film, target.min(1), 1, || true);
                     preview.note(start.elapsed(), f64::from(scene.settings.size.element_product()));
+                    film.confine(budget.region);
                 }
             }
             seconds = start.elapsed().as_secs_f64();
+            stats.preview_seconds = seconds;
             start = Instant::now();
         }
     }
@@ -256,7 +268,7 @@ pub fn trace_frame(
     while film.complete_samples() < target && keep_going() {
         let step = budget.pass_samples;
         rays = rays
-            + if budget.adaptive {
+            + if budget.adaptive && (budget.region.is_none() || film.is_allotted()) {
                 trace_adaptive(&scene, &mut film, target, step, keep_going)
             } else {
                 trace_pass(&scene, &mut film, target, step, keep_going)

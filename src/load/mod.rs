@@ -106,6 +106,8 @@ pub struct LoadOptions {
     pub max_memory: Option<u64>,
     /// Who is told how far it is.
     pub watcher: Watcher,
+    /// `[[edit]]` tables, as a settings file has them, that are applied last.
+    pub edits: Option<String>,
     /// Which animation, by name or by number from 0, instead of the first and those of other things.
     pub animation: Option<String>,
 }
@@ -133,6 +135,9 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         settings.push(Settings::parse(&file, folder.clone(), &bytes)?);
     }
     settings.extend(sidecar(source, format, options, sink)?);
+    if let Some(edits) = &options.edits {
+        settings.push(Settings::parse("edits", folder.clone(), edits.as_bytes())?);
+    }
     let mut materials = Materials::default();
     let mut active = None;
     for settings in &settings {

@@ -321,7 +321,7 @@ impl Row {
                 }
             }
             // Beside an edge it may be of the next pixel.
-            if !(away.abs().max_element() <= 2.0 * near) {
+            if away.abs().max_element() > 2.0 * near {
                 return None;
             }
             moved = (away.abs().max_element() > near).then_some(point);

@@ -60,6 +60,8 @@ pub struct Shown {
     kept: Vec<Vec4>,
     /// Share of the pixels that are in `kept` with old samples; 0: it holds nothing.
     share: f64,
+    /// Seconds that carrying over and developing took, the last time.
+    pub seconds: [f64; 2],
     /// To be overwritten.
     spare: Vec<Place>,
 }
@@ -76,6 +78,14 @@ impl Shown {
     #[must_use]
     pub fn kept_share(&self, samples: u32, done: bool) -> f64 {
         if fade(samples, done) > 0.0 { self.share } else { 0.0 }
+    }
+
+    /// Bytes that it takes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let smoothed = self.smoothed.as_ref().map_or(0, Vec::capacity);
+        (self.cells.capacity() + self.kept.capacity() + smoothed) * size_of::<Vec4>()
+            + (self.places.capacity() + self.spare.capacity()) * size_of::<Place>()
     }
 
     /// Whether the last picture was smoothed.
@@ -129,7 +139,6 @@ impl Shown {
         self.size = size;
         self.cells.resize(width * size.y as usize, Vec4::ZERO);
         let fade = if self.share > 0.0 && self.kept.len() == self.cells.len() { fade } else { 0.0 };
-        let coarse = coarse.filter(|_| film.complete_samples() == 0);
         let kept = &self.kept;
         self.cells.par_chunks_exact_mut(width).zip(0..size.y).for_each(|(row, y)| {
             for ((x, pixel), cell) in (0..size.x).zip(film.row(y)).zip(row) {
@@ -184,6 +193,7 @@ pub fn keep(
             let start = Instant::now();
             shown.carry(&scene, preview.film());
             preview.reserve(start.elapsed());
+            shown.seconds[0] = start.elapsed().as_secs_f64();
         } else {
             shown.forget();
         }
@@ -197,7 +207,6 @@ pub fn keep(
 }
 
 /// Film → [`Picture`], when either it or the way of showing it has changed.
-#[expect(clippy::too_many_arguments, reason = "all that is between them")]
 pub fn develop_film(
     film: Res<Film>,
     preview: Res<Preview>,
@@ -211,6 +220,7 @@ pub fn develop_film(
     if !(film.is_changed() || display.is_changed() || shown.is_changed()) {
         return;
     }
+    let start = Instant::now();
     let shown = shown.bypass_change_detection();
     shown.compose(&film, preview.film(), fade(film.complete_samples(), stats.done));
     let is_young = stats.trace_seconds - shown.began < SMOOTHED && !stats.done && !stats.begun;
@@ -226,4 +236,5 @@ pub fn develop_film(
     let cells = shown.smoothed.as_ref().unwrap_or(&shown.cells);
     develop_linear(cells, shown.size, &display, &mut picture.rgba);
     picture.version += 1;
+    shown.seconds[1] = start.elapsed().as_secs_f64();
 }

@@ -122,12 +122,11 @@ fn keeps(scene: &TraceScene, surface: &Surface, at: &Interaction) -> f32 {
         return MATT;
     }
     let (roughness, metallic) = match material.glossy {
-        Glossy::None => return MATT,
         // Of the same width: α² = 2 / (n + 2) (B. Walter et al., "Microfacet Models for Refraction", 2007).
         Glossy::BlinnPhong { exponent, specular, .. } if specular != Vec3::ZERO => {
             ((2.0 / (exponent + 2.0)).powf(0.25), specular.max_element())
         }
-        Glossy::BlinnPhong { .. } => return MATT,
+        Glossy::None | Glossy::BlinnPhong { .. } => return MATT,
         Glossy::Ggx { metallic, roughness, .. } => {
             let texel = scene.texture(surface.glossy_texture, at.uvs);
             (roughness * texel.y, metallic * texel.z)
