@@ -183,6 +183,9 @@ pub struct SceneArgs {
     /// Settings file to use instead of the .toml beside the scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
+    /// A picture of all directions (.hdr or .exr, longitude by latitude) that lights the scene in place of its own sky
+    #[arg(long, value_name = "FILE")]
+    pub hdri: Option<PathBuf>,
     /// Edits that were not saved, as a screenshot knows them
     #[arg(long, value_name = "TOML", hide = true)]
     pub edits: Option<String>,
@@ -491,7 +494,11 @@ impl SceneArgs {
     /// How to load it.
     #[must_use]
     pub fn load_options(&self) -> LoadOptions {
-        LoadOptions { edits: self.edits.clone(), ..self.part.load_options(self.scene_settings.clone()) }
+        LoadOptions {
+            edits: self.edits.clone(),
+            sky: self.hdri.clone(),
+            ..self.part.load_options(self.scene_settings.clone())
+        }
     }
 
     /// How it should look.

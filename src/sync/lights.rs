@@ -2,12 +2,13 @@
 
 use super::{Entities, Redone, RenderOrigin};
 use crate::scene::color::luminance;
-use crate::scene::{GlobalTransform, Hidden, Light, Material, TriangleMesh, Visible};
+use crate::scene::{GlobalTransform, Hidden, Light, Material, TriangleMesh, Visible, rotation};
 use crate::trace::light::FlatLight;
 use crate::trace::mesh_light::{MeshLight, triangle_area};
 use crate::trace::quad::Quad;
 use crate::trace::scene::InstanceData;
 use crate::trace::shape_light::{Shape, ShapeLight};
+use crate::trace::sky::SkyLight;
 use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, Vec3};
@@ -115,6 +116,10 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
         Light::Sphere { radius, radiance } => {
             let scale = Vec3::AXES.map(|a| vector(a).length()).iter().sum::<f32>() / 3.0;
             solid(Shape::Sphere { center: position, radius: radius * scale }, [radiance; 4], true)
+        }
+        Light::Sky { ref sky, scale } => {
+            let turned = rotation(placed.matrix3).as_mat3();
+            SkyLight::new(sky, scale, turned).map(FlatLight::Sky)
         }
         Light::Environment { radiance } => {
             (radiance != Vec3::ZERO).then_some(FlatLight::Environment { radiance })

@@ -25,6 +25,7 @@ pub mod scene;
 pub mod settings;
 pub mod shape_light;
 mod sightlines;
+pub mod sky;
 pub mod surface;
 pub mod texture;
 pub mod visible;

@@ -8,7 +8,7 @@ use super::instrument::{Instrument, Reference};
 use super::keymap::Tap;
 use super::plain::Plain;
 use super::prepare::{prepare, status};
-use super::reload::{load_again, open_other};
+use super::reload::{is_sky, load_again, open_other, set_sky};
 use super::status::Status;
 use super::watch::{PAUSE, SceneWatch};
 use crate::app::{App, FrameBudget, FrameStats};
@@ -218,6 +218,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             path.as_ref().map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned());
         let watcher = self.watcher(name.as_deref().unwrap_or("the scene again"));
         let loaded = match path {
+            Some(path) if is_sky(&path) => set_sky(app, path, watcher),
             Some(path) => open_other(app, &path, watcher),
             None => load_again(app, watcher),
         };

@@ -45,6 +45,9 @@ pub fn recipe(world: &World) -> Recipe {
             std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
         );
     }
+    if let Some(path) = &origin.options.sky {
+        add("--hdri", std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string());
+    }
     if let Some(edits) = unsaved(world, origin) {
         add("--edits", edits);
     }

@@ -19,7 +19,7 @@ use crate::shown::Shown;
 use crate::sync::BlasCache;
 use crate::trace::{Film, RenderSettings};
 use bevy_ecs::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Loads `path` in place of what `app` shows, with the same settings.
 ///
@@ -38,6 +38,29 @@ pub fn open_other(app: &App, path: &Path, watcher: Watcher) -> Result<App, Strin
     keep_switches(app, &mut other);
     other.world.insert_resource(Instrument::default().moved());
     Ok(other)
+}
+
+/// Whether `path` is a picture of all directions, not a scene.
+#[must_use]
+pub fn is_sky(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    matches!(ending.as_deref(), Some("hdr" | "exr"))
+}
+
+/// Loads the scene again under this sky.
+///
+/// # Errors
+/// Why it cannot be shown; `app` is as it was then.
+pub fn set_sky(app: &mut App, sky: PathBuf, watcher: Watcher) -> Result<App, String> {
+    let mut origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
+    let before = origin.clone();
+    origin.options.sky = Some(sky);
+    app.world.insert_resource(origin);
+    let loaded = load_again(app, watcher);
+    if loaded.is_err() {
+        app.world.insert_resource(before);
+    }
+    loaded
 }
 
 /// Loads the scene again and gives it the camera, the edits and all settings of `app`.
