@@ -1,7 +1,5 @@
 //! The sky as a light: its samples go as its density says, and an even sky is the closed form.
 
-mod support;
-
 use glam::{DMat3, DVec3, Mat3, UVec2, Vec2, Vec3};
 use penumbra::app::{App, FrameBudget};
 use penumbra::load::{LoadOptions, SceneSource};
@@ -37,7 +35,7 @@ fn random(i: u32, seed: u32) -> Vec2 {
 #[test]
 fn the_density_is_one_over_all_directions_and_zero_only_where_it_is_black() {
     let (sky, turned) = sky();
-    let light = SkyLight::new(&sky, Vec3::ONE, turned).unwrap();
+    let light = SkyLight::new(&sky, Vec3::ONE, turned, None).unwrap();
     // Midpoints in cosine and turn: an even grid in solid angle, finer than the pixels.
     let (mut sum, n) = (0.0, 512);
     for i in 0..n {
@@ -57,7 +55,7 @@ fn the_density_is_one_over_all_directions_and_zero_only_where_it_is_black() {
 #[test]
 fn samples_tell_the_radiance_and_density_of_their_direction() {
     let (sky, turned) = sky();
-    let light = SkyLight::new(&sky, Vec3::new(1.0, 2.0, 0.5), turned).unwrap();
+    let light = SkyLight::new(&sky, Vec3::new(1.0, 2.0, 0.5), turned, None).unwrap();
     let mut differing = 0;
     for i in 0..20_000 {
         let sample = light.sample(random(i, 1)).unwrap();
@@ -73,7 +71,7 @@ fn samples_tell_the_radiance_and_density_of_their_direction() {
 #[test]
 fn samples_are_spread_as_the_density_says() {
     let (sky, turned) = sky();
-    let light = SkyLight::new(&sky, Vec3::ONE, turned).unwrap();
+    let light = SkyLight::new(&sky, Vec3::ONE, turned, None).unwrap();
     let [width, height] = sky.size();
     let count = 400_000;
     let mut seen = vec![0.0; width * height];

@@ -127,6 +127,9 @@ impl Shown {
             );
             self.exact_rows = last;
             if last == height {
+                // So that the first step does not wait for memory.
+                self.kept.resize(width * height, Vec4::ZERO);
+                self.spare.resize(width * height, Place::unknown());
                 carry::mark_edges(&mut self.places, self.size, &scene.viewpoint.sheet(self.size));
             }
         }

@@ -75,16 +75,17 @@ pub fn smooth(
         .zip(places)
         .map(|(cell, place)| (cell.truncate() / base(place)).extend(0.0))
         .collect();
-    let variances = variances(film, cells, places, &guides, &light);
+    let variances = variances(film, cells, places, &guides, &light, &keep_going)?;
     light.iter_mut().zip(variances).for_each(|(light, variance)| light.w = variance);
     let mut spare = light.clone();
     for step in STEPS {
         for stride in [1, width] {
-            if !keep_going() {
-                return None;
-            }
             let (from, guides) = (&light, &guides);
             spare.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+                // A key was pressed: nobody will see this.
+                if !keep_going() {
+                    return;
+                }
                 for (x, out) in row.iter_mut().enumerate() {
                     let (at, end) = if stride == 1 { (x, width) } else { (y, height) };
                     *out = mean(from, guides, y * width + x, stride, (at, end), step);
@@ -92,6 +93,9 @@ pub fn smooth(
             });
             std::mem::swap(&mut spare, &mut light);
         }
+    }
+    if !keep_going() {
+        return None;
     }
     let mut smoothed = light;
     smoothed.par_iter_mut().zip(cells).zip(places).for_each(|((out, cell), place)| {
@@ -140,8 +144,15 @@ fn mean(
 }
 
 /// Of the luminance of each pixel's light: by the film's two halves where both have samples, else by its
-/// neighbours; meant over those of the same surface.
-fn variances(film: &Film, cells: &[Vec4], places: &[Place], guides: &[Guide], light: &[Vec4]) -> Vec<f32> {
+/// neighbours; meant over those of the same surface. `None` if there was no time.
+fn variances(
+    film: &Film,
+    cells: &[Vec4],
+    places: &[Place],
+    guides: &[Guide],
+    light: &[Vec4],
+    keep_going: &(impl Fn() -> bool + Sync),
+) -> Option<Vec<f32>> {
     let [width, height] = film.size().to_array().map(|n| n as usize);
     let has_halves = film.complete_samples() >= 2;
     let mut own = vec![0.0; cells.len()];
@@ -159,6 +170,9 @@ fn variances(film: &Film, cells: &[Vec4], places: &[Place], guides: &[Guide], li
     }
     let mut variances = vec![0.0; cells.len()];
     variances.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+        if !keep_going() {
+            return;
+        }
         let reach =
             |at: usize, end: usize| at.saturating_sub(AROUND as usize)..(at + AROUND as usize + 1).min(end);
         for (x, variance) in row.iter_mut().enumerate() {
@@ -180,5 +194,5 @@ fn variances(film: &Film, cells: &[Vec4], places: &[Place], guides: &[Guide], li
             *variance = if has_halves { halves / count } else { (squares / count - mean * mean).max(0.0) };
         }
     });
-    variances
+    keep_going().then_some(variances)
 }

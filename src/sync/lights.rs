@@ -38,7 +38,7 @@ pub fn sync_lights(
     entities.lights.clear();
     let mut flat: Vec<FlatLight> = Vec::new();
     for (entity, light, global, visible) in placed {
-        if let Some(light) = flatten(light, &origin.render_from(global), visible) {
+        if let Some(light) = flatten(light, &origin.render_from(global), visible, &lights) {
             entities.lights.push(entity);
             flat.push(light);
         }
@@ -58,7 +58,12 @@ pub fn sync_lights(
 }
 
 /// The light in render space; `None` if it emits nothing, has no place, or its placement left it no extent.
-fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Option<FlatLight> {
+fn flatten(
+    light: &Light,
+    placed: &DAffine3,
+    visible: Option<&Visible>,
+    before: &Lights,
+) -> Option<FlatLight> {
     if !placed.is_finite() {
         return None;
     }
@@ -119,7 +124,11 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
         }
         Light::Sky { ref sky, scale } => {
             let turned = rotation(placed.matrix3).as_mat3();
-            SkyLight::new(sky, scale, turned).map(FlatLight::Sky)
+            let old = (0..before.len() as u32).find_map(|i| match before.get(i) {
+                FlatLight::Sky(old) => Some(old),
+                _ => None,
+            });
+            SkyLight::new(sky, scale, turned, old).map(FlatLight::Sky)
         }
         Light::Environment { radiance } => {
             (radiance != Vec3::ZERO).then_some(FlatLight::Environment { radiance })

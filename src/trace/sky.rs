@@ -5,7 +5,7 @@
 use super::light::LightSample;
 use crate::scene::Sky;
 use crate::scene::color::luminance;
-use glam::{Mat3, Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -26,22 +26,28 @@ struct Table {
     rows: Vec<f32>,
     /// Those of the columns in each row.
     columns: Vec<f32>,
-    /// Mean luminance over all directions.
-    mean: f32,
+    /// Mean radiance over all directions, before the scale.
+    mean: Vec3,
 }
 
 impl SkyLight {
-    /// `None` if it is black.
+    /// `None` if it is black. One of the same picture, if there was one, lends its table.
     #[must_use]
-    pub fn new(sky: &Sky, scale: Vec3, render_from_sky: Mat3) -> Option<Self> {
-        let table = Arc::new(Table::new(sky, scale)?);
+    pub fn new(sky: &Sky, scale: Vec3, render_from_sky: Mat3, before: Option<&Self>) -> Option<Self> {
+        if scale == Vec3::ZERO {
+            return None;
+        }
+        let table = match before.filter(|before| before.sky == *sky) {
+            Some(before) => Arc::clone(&before.table),
+            None => Arc::new(Table::new(sky)?),
+        };
         Some(Self { sky: sky.clone(), scale, render_from_sky, table })
     }
 
     /// Mean luminance over all directions.
     #[must_use]
     pub fn mean_luminance(&self) -> f32 {
-        self.table.mean
+        luminance(self.table.mean * self.scale)
     }
 
     /// Radiance from the unit direction `wi`, and the density of [`SkyLight::sample`] there.
@@ -94,18 +100,20 @@ fn choose(cumulative: &[f32], u: f32) -> (usize, f32) {
 }
 
 impl Table {
-    fn new(sky: &Sky, scale: Vec3) -> Option<Self> {
+    fn new(sky: &Sky) -> Option<Self> {
         let [width, height] = sky.size();
         let mut sums = Vec::with_capacity(height);
+        let mut mean = DVec3::ZERO;
         let mut columns = Vec::with_capacity(width * height);
         for (y, row) in sky.radiance().chunks_exact(width).enumerate() {
-            let weights: Vec<f64> = row.iter().map(|&pixel| f64::from(luminance(pixel * scale))).collect();
+            let weights: Vec<f64> = row.iter().map(|&pixel| f64::from(luminance(pixel))).collect();
             let sum = accumulate(&weights, &mut columns);
             sums.push(sum * solid_angle(y, width, height));
+            mean += row.iter().map(|pixel| pixel.as_dvec3()).sum::<DVec3>() * solid_angle(y, width, height);
         }
         let mut rows = Vec::with_capacity(height);
         let total = accumulate(&sums, &mut rows);
-        let mean = (total / (4.0 * std::f64::consts::PI)) as f32;
+        let mean = (mean / (4.0 * std::f64::consts::PI)).as_vec3();
         (total > 0.0 && total.is_finite()).then_some(Self { rows, columns, mean })
     }
 }
