@@ -15,9 +15,9 @@ pub struct Preview {
 }
 
 /// Time that a preview may take, with what is carried over from the picture before.
-const TARGET: Duration = Duration::from_millis(16);
+const TARGET: Duration = Duration::from_millis(14);
 /// Of that, what is left to the preview in any case.
-const OWN: f64 = 0.5;
+const OWN: f64 = 0.35;
 /// A finer step is taken only if it is expected to need less than this part of [`TARGET`]: without the
 /// gap two steps would alternate.
 const HEADROOM: f64 = 0.7;
