@@ -7,7 +7,7 @@
 
 use super::{MOST, Shown};
 use crate::trace::camera::Sheet;
-use crate::trace::place::{Place, places};
+use crate::trace::place::{Place, Spot, places};
 use crate::trace::{Film, TraceScene};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ const NEAR: f32 = 4.0;
 /// larger than this: around it the surface is continued as a plane.
 const BLOCKS: [u32; 2] = [2, 4];
 /// If more of the blocks than this share see an edge, there is no time to look closer.
-const MOST_EDGES: f32 = 0.3;
+const MOST_EDGES: f32 = 0.2;
 /// A preview that counts less than this share of the old samples is left out.
 const NOTABLE: f32 = 0.02;
 /// Old pixels that are worth less are left alone, samples.
@@ -34,7 +34,7 @@ struct Old<'a> {
     size: UVec2,
     sheet: Sheet,
     cells: &'a [Vec4],
-    places: &'a [Place],
+    spots: &'a [Spot],
 }
 
 /// A row of the new picture: rays as linear functions of x, in render space and in the old camera's own.
@@ -46,25 +46,20 @@ struct Row {
 }
 
 impl Shown {
-    /// Makes `kept` and `places` those of `scene`'s viewpoint.
+    /// Makes `kept` and `spots` those of `scene`'s viewpoint.
     pub(super) fn carry(&mut self, scene: &TraceScene, preview: Option<&Film>) {
         let Some(before) = self.viewpoint.replace(*scene.viewpoint) else { return };
         let size = self.size;
         let count = size.element_product() as usize;
-        if self.places.len() != count {
-            self.places.clear();
-            self.places.resize(count, Place::unknown());
-        }
-        let old_sheet = before.sheet(size);
-        // Those of a whole picture are marked already.
-        if self.exact_rows > 0 && !self.is_looked_at() {
-            mark_edges(&mut self.places, size, &old_sheet);
+        if self.spots.len() != count {
+            self.spots.clear();
+            self.spots.resize(count, Spot::UNKNOWN);
         }
         let new = scene.viewpoint.sheet(size);
         let grid = Grid::new(scene, &new, preview);
         self.kept.resize(count, Vec4::ZERO);
-        self.spare.resize(count, Place::unknown());
-        let old = Old { size, sheet: old_sheet, cells: &self.cells, places: &self.places };
+        self.spare.resize(count, Spot::UNKNOWN);
+        let old = Old { size, sheet: before.sheet(size), cells: &self.cells, spots: &self.spots };
         let width = size.x as usize;
         let carried: usize = self
             .kept
@@ -74,31 +69,8 @@ impl Shown {
             .map(|((kept, found), y)| carry_row(scene, &new, &old, &grid, y, kept, found))
             .sum();
         self.share = carried as f64 / count as f64;
-        std::mem::swap(&mut self.places, &mut self.spare);
+        std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
-    }
-}
-
-/// Marks pixels that show more than one surface: what they show is of none of them.
-pub(super) fn mark_edges(places: &mut [Place], size: UVec2, sheet: &Sheet) {
-    let width = size.x as usize;
-    let differ = |a: &Place, b: &Place| {
-        let pixel = sheet.pixel(sheet.own(a.position).z.max(0.0));
-        !a.continues(b, 2.0 * pixel)
-    };
-    let mut edges = vec![false; places.len()];
-    edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
-        let at = |x: usize, y: usize| &places[y * width + x];
-        for (x, edge) in edges.iter_mut().enumerate() {
-            let here = at(x, y);
-            *edge = x > 0 && differ(here, at(x - 1, y))
-                || x + 1 < width && differ(here, at(x + 1, y))
-                || y > 0 && differ(here, at(x, y - 1))
-                || y + 1 < size.y as usize && differ(here, at(x, y + 1));
-        }
-    });
-    for (place, edge) in places.iter_mut().zip(edges) {
-        place.edge = edge;
     }
 }
 
@@ -192,7 +164,7 @@ fn carry_row(
     grid: &Grid<'_>,
     y: u32,
     kept: &mut [Vec4],
-    found: &mut [Place],
+    found: &mut [Spot],
 ) -> usize {
     let row = Row::new(new, &old.sheet, y as f32 + 0.5);
     let v = y * grid.size.y / old.size.y;
@@ -222,7 +194,7 @@ fn carry_row(
                     let radiance = (cell.truncate() * hit.weight + preview * grid.worth) / sum;
                     radiance.extend(sum.min(MOST))
                 };
-                *found = Place { edge: false, ..old.places[hit.index] };
+                *found = old.spots[hit.index];
                 if let Some(moved) = hit.moved {
                     found.position = moved;
                 }
@@ -232,7 +204,7 @@ fn carry_row(
                 let (position, depth) = row.meet(x, &place).unwrap_or((place.position, 1.0));
                 let color = grid.color([x, y], old.size, &place, new.pixel(depth));
                 *kept = color.extend(grid.worth);
-                *found = Place { position, edge: false, ..place };
+                *found = Spot::from(&Place { position, edge: false, ..place });
             }
         }
     }
@@ -281,9 +253,9 @@ impl Row {
             }
             let own = at(self.old_direction);
             let index = old.index(old.sheet.place(own), own.z)?;
-            let there = &old.places[index];
+            let there = &old.spots[index];
             let weight = old.cells[index].w.min(MOST);
-            let is_it = there.thing == Place::NOTHING && !there.edge && weight > LEAST;
+            let is_it = there.thing == Place::NOTHING && there.keeps > 0 && weight > LEAST;
             return is_it.then_some(Found { index, weight, moved: None });
         }
         let (point, depth) = self.meet(x, place)?;
@@ -291,14 +263,14 @@ impl Row {
         let (pixel, old_pixel) = (new.pixel(depth), old.sheet.pixel(own.z));
         let reach = NEAR * pixel.max(old_pixel);
         let is_it = |index: usize| {
-            let there = &old.places[index];
+            let there = &old.spots[index];
             there.thing == place.thing
-                && !there.edge
-                && there.facet.dot(place.facet) > ALIKE
+                && there.keeps > 0
+                && there.facet().dot(place.facet) > ALIKE
                 && place.facet.dot(there.position - point).abs() <= reach
         };
         let middle = Vec2::new(x as f32, y as f32) + 0.5;
-        let off = |index: usize| new.place(new.own(old.places[index].position)) - middle;
+        let off = |index: usize| new.place(new.own(old.spots[index].position)) - middle;
         // One old pixel for many new ones says less about each.
         let spread = (pixel / old_pixel).min(1.0);
         let near = 0.8 / spread;
@@ -326,7 +298,7 @@ impl Row {
             }
             moved = (away.abs().max_element() > near).then_some(point);
         }
-        let keeps = f32::from(place.keeps.min(old.places[index].keeps));
+        let keeps = f32::from(place.keeps.min(old.spots[index].keeps));
         let weight = old.cells[index].w.min(MOST).min(keeps) * (spread * spread);
         (weight > LEAST).then_some(Found { index, weight, moved })
     }

@@ -13,7 +13,8 @@ use crate::image::compare::LinearImage;
 use crate::image::develop::{Display, Picture, develop_linear};
 use crate::preview::Preview;
 use crate::sync::Traceable;
-use crate::trace::place::{Place, places};
+use crate::trace::camera::Sheet;
+use crate::trace::place::{Place, Spot, places};
 use crate::trace::{Film, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec2, Vec3, Vec4};
@@ -48,13 +49,15 @@ pub struct Shown {
     /// The last picture, smoothed, if that was shown.
     smoothed: Option<Vec<Vec4>>,
     size: UVec2,
-    /// From where `cells` and `places` are seen.
+    /// From where `cells` and `spots` are seen.
     viewpoint: Option<Viewpoint>,
     /// Radiance, and how many samples it is worth. Of the last picture.
     cells: Vec<Vec4>,
-    /// What is behind each pixel.
+    /// What is behind each pixel, to find it again.
+    spots: Vec<Spot>,
+    /// The same, to smooth by; as far as `exact_rows`.
     places: Vec<Place>,
-    /// Rows whose places are those of the pixels' middles, seen from `viewpoint`.
+    /// Rows whose spots and places are those of the pixels' middles, seen from `viewpoint`.
     exact_rows: usize,
     /// The same as `cells`, carried over from the view before; nothing of the film.
     kept: Vec<Vec4>,
@@ -63,7 +66,7 @@ pub struct Shown {
     /// Seconds that carrying over and developing took, the last time.
     pub seconds: [f64; 2],
     /// To be overwritten.
-    spare: Vec<Place>,
+    spare: Vec<Spot>,
 }
 
 impl Shown {
@@ -85,7 +88,8 @@ impl Shown {
     pub fn bytes(&self) -> usize {
         let smoothed = self.smoothed.as_ref().map_or(0, Vec::capacity);
         (self.cells.capacity() + self.kept.capacity() + smoothed) * size_of::<Vec4>()
-            + (self.places.capacity() + self.spare.capacity()) * size_of::<Place>()
+            + (self.spots.capacity() + self.spare.capacity()) * size_of::<Spot>()
+            + self.places.capacity() * size_of::<Place>()
     }
 
     /// Whether the last picture was smoothed.
@@ -109,29 +113,46 @@ impl Shown {
     /// Finds out what is behind the pixels, some rows of them.
     fn look(&mut self, scene: &TraceScene, keep_going: impl Fn() -> bool) {
         let [width, height] = self.size.to_array().map(|n| n as usize);
-        if self.viewpoint != Some(*scene.viewpoint) || self.places.len() != width * height {
+        let count = width * height;
+        if self.viewpoint != Some(*scene.viewpoint) || self.spots.len() != count {
             self.viewpoint = Some(*scene.viewpoint);
-            self.places.clear();
-            self.places.resize(width * height, Place::unknown());
+            self.spots.clear();
+            self.spots.resize(count, Spot::UNKNOWN);
             self.exact_rows = 0;
         }
+        self.places.resize(count, Place::unknown());
         while self.exact_rows < height && keep_going() {
             let first = self.exact_rows;
             let last = (first + BAND).min(height);
-            self.places[first * width..last * width].par_chunks_mut(width).zip(first..last).for_each(
-                |(row, y)| {
-                    let middles: Vec<Vec2> =
-                        (0..width).map(|x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
-                    places(scene, &middles, row);
-                },
-            );
-            self.exact_rows = last;
-            if last == height {
-                // So that the first step does not wait for memory.
-                self.kept.resize(width * height, Vec4::ZERO);
-                self.spare.resize(width * height, Place::unknown());
-                carry::mark_edges(&mut self.places, self.size, &scene.viewpoint.sheet(self.size));
+            let rows = first * width..last * width;
+            self.places[rows].par_chunks_mut(width).zip(first..last).for_each(|(row, y)| {
+                let middles: Vec<Vec2> =
+                    (0..width).map(|x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
+                places(scene, &middles, row);
+            });
+            // A row's edges are known when the one below is.
+            let sheet = scene.viewpoint.sheet(self.size);
+            let known = if last == height { height } else { last - 1 };
+            let marked = first.saturating_sub(1)..known;
+            let (places, from) = (&self.places, marked.start);
+            let edges: Vec<bool> = marked
+                .clone()
+                .into_par_iter()
+                .flat_map_iter(|y| edges(places, width, y, last, &sheet))
+                .collect();
+            let rows = from * width..known * width;
+            for ((place, spot), edge) in
+                self.places[rows.clone()].iter_mut().zip(&mut self.spots[rows]).zip(edges)
+            {
+                place.edge = edge;
+                *spot = Spot::from(&*place);
             }
+            self.exact_rows = last;
+        }
+        if self.is_looked_at() {
+            // So that the first step does not wait for memory.
+            self.kept.resize(count, Vec4::ZERO);
+            self.spare.resize(count, Spot::UNKNOWN);
         }
     }
 
@@ -141,6 +162,16 @@ impl Shown {
         let width = size.x as usize;
         self.size = size;
         self.cells.resize(width * size.y as usize, Vec4::ZERO);
+        // While one moves there is nothing but what was carried over.
+        if self.share > 0.0
+            && self.kept.len() == self.cells.len()
+            && fade == 1.0
+            && film.mean_samples() == 0.0
+        {
+            let chunks = self.cells.par_chunks_mut(width).zip(self.kept.par_chunks(width));
+            chunks.for_each(|(cells, kept)| cells.copy_from_slice(kept));
+            return;
+        }
         let fade = if self.share > 0.0 && self.kept.len() == self.cells.len() { fade } else { 0.0 };
         let kept = &self.kept;
         self.cells.par_chunks_exact_mut(width).zip(0..size.y).for_each(|(row, y)| {
@@ -163,6 +194,25 @@ impl Shown {
             }
         });
     }
+}
+
+/// Which pixels of row `y` show more than one surface: what they show is of none of them. Rows below `end` are known.
+fn edges<'a>(
+    places: &'a [Place],
+    width: usize,
+    y: usize,
+    end: usize,
+    sheet: &'a Sheet,
+) -> impl Iterator<Item = bool> + 'a {
+    (0..width).map(move |x| {
+        let here = &places[y * width + x];
+        let pixel = 2.0 * sheet.pixel(sheet.own(here.position).z.max(0.0));
+        let differs = |x: usize, y: usize| !here.continues(&places[y * width + x], pixel);
+        x > 0 && differs(x - 1, y)
+            || x + 1 < width && differs(x + 1, y)
+            || y > 0 && differs(x, y - 1)
+            || y + 1 < end && differs(x, y + 1)
+    })
 }
 
 /// What an old sample counts beside a new one, if every pixel has so many new ones.

@@ -7,7 +7,7 @@ use crate::bvh::{Hit, Ray};
 use crate::scene::Glossy;
 use glam::{Vec2, Vec3};
 
-/// The first surface behind a point of the picture. Packed: there is one for each pixel.
+/// The first surface behind a point of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Where, in render space; where there is nothing, the unit direction.
@@ -24,6 +24,40 @@ pub struct Place {
     pub albedo: [u8; 3],
     /// A pixel here shows several surfaces.
     pub edge: bool,
+}
+
+/// What is remembered of a [`Place`] for each pixel, to find it again: small, for all of it is read and written
+/// for each picture while one moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// See [`Place::position`].
+    pub position: Vec3,
+    /// See [`Place::thing`].
+    pub thing: u32,
+    /// Unit geometric normal, times 127.
+    pub facet: [i8; 3],
+    /// See [`Place::keeps`]; 0 also where a pixel shows several surfaces.
+    pub keeps: u8,
+}
+
+impl Spot {
+    /// Not looked at yet.
+    pub const UNKNOWN: Self = Self { position: Vec3::ZERO, thing: Place::UNKNOWN, facet: [0; 3], keeps: 0 };
+
+    /// Unit geometric normal toward the eye.
+    #[inline(always)]
+    #[must_use]
+    pub fn facet(&self) -> Vec3 {
+        let [x, y, z] = self.facet;
+        Vec3::new(f32::from(x), f32::from(y), f32::from(z)) * (1.0 / 127.0)
+    }
+}
+
+impl From<&Place> for Spot {
+    fn from(place: &Place) -> Self {
+        let keeps = if place.edge { 0 } else { place.keeps };
+        Self { position: place.position, thing: place.thing, facet: packed(place.facet), keeps }
+    }
 }
 
 /// Below this perceptual roughness one sees reflections, which move with the eye.
