@@ -163,7 +163,7 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     if let Some(path) = &options.sky {
         let light = Light::Sky { sky: sky::read(path, &sink.budget)?, scale: Vec3::ONE };
         sink.spawn((Name::new("sky"), Transform::default(), light));
-        sink.decide(&file, &format!("its sky is {}", path.display()));
+        sink.decide(&file, format!("its sky is {}", path.display()));
     }
     for settings in &settings {
         settings.apply_edits(sink)?;

@@ -37,7 +37,7 @@ impl Sky {
     /// the rows are not whole.
     #[must_use]
     pub fn new(width: usize, mut radiance: Vec<Vec3>) -> Option<Self> {
-        if width == 0 || radiance.is_empty() || radiance.len() % width != 0 {
+        if width == 0 || radiance.is_empty() || !radiance.len().is_multiple_of(width) {
             return None;
         }
         let mut print = 0xcbf2_9ce4_8422_2325_u64;
