@@ -11,16 +11,18 @@ use crate::trace::place::{Place, Spot, places};
 use crate::trace::{Film, TraceScene};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
+use std::time::Instant;
 
 /// Surfaces count as the same up to an angle of this cosine, ...
 const ALIKE: f32 = 0.9;
 /// ... and up to a distance of so many pixels from the other one's plane.
 const NEAR: f32 = 4.0;
-/// Blocks of the new picture in whose middle one looks are as large as the preview's pixels, but no smaller and no
-/// larger than this: around it the surface is continued as a plane.
-const BLOCKS: [u32; 2] = [2, 4];
-/// If more of the blocks than this share see an edge, there is no time to look closer.
-const MOST_EDGES: f32 = 0.2;
+/// How closely one looks, least first: least and largest side of the blocks of the new picture
+/// in whose middle one looks (as large as the preview's pixels in between; around it the surface is continued as a
+/// plane), and the share of them that may see an edge, so that their pixels are looked at one by one.
+const EFFORTS: [([u32; 2], f32); 4] = [([8, 8], 0.0), ([4, 8], 0.0), ([4, 4], 0.1), ([2, 4], 0.2)];
+/// Seconds of carrying over above which one looks less closely, and below which more.
+const SECONDS: [f64; 2] = [0.005, 0.010];
 /// A preview that counts less than this share of the old samples is left out.
 const NOTABLE: f32 = 0.02;
 /// Old pixels that are worth less are left alone, samples.
@@ -56,7 +58,8 @@ impl Shown {
             self.spots.resize(count, Spot::UNKNOWN);
         }
         let new = scene.viewpoint.sheet(size);
-        let grid = Grid::new(scene, &new, preview);
+        let start = Instant::now();
+        let grid = Grid::new(scene, &new, preview, EFFORTS.len() - 1 - self.saved.min(EFFORTS.len() - 1));
         self.kept.resize(count, Vec4::ZERO);
         self.spare.resize(count, Spot::UNKNOWN);
         let old = Old { size, sheet: before.sheet(size), cells: &self.cells, spots: &self.spots };
@@ -71,6 +74,13 @@ impl Shown {
         self.share = carried as f64 / count as f64;
         std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
+        let seconds = start.elapsed().as_secs_f64();
+        let [little, much] = SECONDS;
+        if seconds > much {
+            self.saved = (self.saved + 1).min(EFFORTS.len() - 1);
+        } else if seconds < little {
+            self.saved = self.saved.saturating_sub(1);
+        }
     }
 }
 
@@ -87,9 +97,9 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(scene: &TraceScene, sheet: &Sheet, preview: Option<&'a Film>) -> Self {
+    fn new(scene: &TraceScene, sheet: &Sheet, preview: Option<&'a Film>, effort: usize) -> Self {
         let full = scene.settings.size;
-        let [least, most] = BLOCKS;
+        let ([least, most], most_edges) = EFFORTS[effort];
         let side = preview.map_or(least, |film| (full.y / film.size().y).clamp(least, most));
         let size = (full / side).max(UVec2::ONE);
         let pitch = full.as_vec2() / size.as_vec2();
@@ -119,7 +129,7 @@ impl<'a> Grid<'a> {
         }
         let worth =
             preview.map_or(0.0, |film| film.size().element_product() as f32 / full.element_product() as f32);
-        Self { size, exact: count as f32 <= MOST_EDGES * blocks.len() as f32, blocks, preview, worth }
+        Self { size, exact: count as f32 <= most_edges * blocks.len() as f32, blocks, preview, worth }
     }
 
     fn at(&self, x: u32, y: u32) -> &Place {

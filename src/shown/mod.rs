@@ -65,6 +65,8 @@ pub struct Shown {
     share: f64,
     /// Seconds that carrying over and developing took, the last time.
     pub seconds: [f64; 2],
+    /// How much less closely than one could one looks at the new view, to be in time.
+    saved: usize,
     /// To be overwritten.
     spare: Vec<Spot>,
 }
