@@ -116,7 +116,7 @@ impl Leaves {
         let (first, count) = leaf;
         let rows = &self.rows[first * 9..first * 9 + count * 9 + MAX_LEAF];
         let mut candidates = lowest(count) as u32;
-        let (mut certain, mut doubtful) = (0, 0);
+        let (mut certain, mut doubtful, mut close) = (0, 0, 0);
         let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
         if !probe.extreme {
             let shear = Shear {
@@ -130,8 +130,11 @@ impl Leaves {
             }
             let distance = shear.distance(simd, &edges);
             let on_edge = distance.on_edge.bits();
-            certain = distance.ahead.and(distance.t.le(S::F8::splat(simd, t_max))).bits() & !on_edge;
-            doubtful = distance.doubtful.bits() & !on_edge;
+            let limit = S::F8::splat(simd, t_max);
+            certain = distance.ahead.and(distance.t.le(limit)).bits() & !on_edge;
+            let beyond = distance.rough.and((limit + distance.margin).lt(distance.t)).bits();
+            doubtful = distance.doubtful.bits() & !on_edge & !beyond;
+            close = distance.close.bits();
             candidates &= certain | doubtful | on_edge;
             distance.t.store(&mut ts);
             (edges.weights[1] * distance.inverse_determinant).store(&mut us);
@@ -144,7 +147,7 @@ impl Leaves {
             let found = if certain >> i & 1 != 0 {
                 within(rough, t_max)
             } else if doubtful >> i & 1 != 0 {
-                probe.doubtful_triangle(&corners(), t_max)
+                probe.doubtful_triangle(&corners(), t_max, close >> i & 1 != 0)
             } else {
                 probe.triangle(&corners(), t_max)
             };
@@ -199,8 +202,20 @@ impl Leaves {
                 let distance = shear.distance(simd, &edges);
                 let on_edge = distance.on_edge.bits() & inside;
                 let certain = distance.ahead.bits() & inside & !on_edge;
-                let doubtful = distance.doubtful.bits() & inside & !on_edge;
+                let mut doubtful = distance.doubtful.bits() & inside & !on_edge;
+                let close = distance.close.bits();
                 let t_max: S::F16 = packet.rays.t_max.get(simd, group);
+                if doubtful != 0 {
+                    let (t, margin) = (distance.t, distance.margin);
+                    doubtful &= !distance.rough.and((t_max + margin).lt(t)).bits();
+                    if ANY && takes.is_none() {
+                        // That there is a hit is enough.
+                        let between = margin.lt(t).and((t + margin).lt(t_max));
+                        let surely = distance.rough.and(between).bits() & doubtful;
+                        done |= u64::from(surely) << base;
+                        doubtful &= !surely;
+                    }
+                }
                 let u = edges.weights[1] * distance.inverse_determinant;
                 let v = edges.weights[2] * distance.inverse_determinant;
                 let mut one_by_one = doubtful | on_edge | extreme;
@@ -232,7 +247,7 @@ impl Leaves {
                     let hit = if certain >> k & 1 != 0 {
                         Some(rough)
                     } else if doubtful >> k & 1 != 0 {
-                        packet.probe(lane).doubtful_triangle(&corners, t_max)
+                        packet.probe(lane).doubtful_triangle(&corners, t_max, close >> k & 1 != 0)
                     } else {
                         packet.probe(lane).triangle(&corners, t_max)
                     };

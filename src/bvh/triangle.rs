@@ -59,6 +59,11 @@ pub(super) struct Distance<V: Lanes> {
     pub ahead: V::Mask,
     /// So near or so thin that it has to be measured again.
     pub doubtful: V::Mask,
+    /// Doubtful, but `t` is off by less than `margin`.
+    pub rough: V::Mask,
+    pub margin: V,
+    /// Rough, and so near that nothing which leaves the triangle's plane can hit it.
+    pub close: V::Mask,
     /// Exactly through an edge, as far as single precision can tell: nothing is known.
     pub on_edge: V::Mask,
 }
@@ -104,8 +109,13 @@ impl<V: Lanes> Shear<V> {
         let [x, y, _] = three!(|i| a[i % 2].abs().max(b[i % 2].abs()).max(c[i % 2].abs()));
         let least = (x * y * V::splat(proof, THIN)).max(V::splat(proof, TINY));
         let area = determinant.abs();
-        let ahead = cancels.lt(t).and(least.le(area));
-        Distance { t, inverse_determinant, ahead, doubtful: near.or(area.lt(least)), on_edge }
+        let wide = least.le(area);
+        let ahead = cancels.lt(t).and(wide);
+        let rough = near.and(wide);
+        let margin = reach * V::splat(proof, -BEHIND);
+        let close = rough.and(t.le(reach * V::splat(proof, 0.5 * CANCELLATION)));
+        let doubtful = near.or(area.lt(least));
+        Distance { t, inverse_determinant, ahead, doubtful, rough, margin, close, on_edge }
     }
 }
 
@@ -143,13 +153,13 @@ impl Probe {
         if edges.weights.iter().any(|&w| w.get() == 0.0) {
             let weights = self.exact_weights(corners)?;
             if weights.iter().sum::<f64>().abs() < f64::from(TINY) {
-                return self.doubtful_triangle(corners, t_max);
+                return self.doubtful_triangle(corners, t_max, false);
             }
             edges.weights = weights.map(|w| one(w as f32));
         }
         let distance = shear.distance(Plain, &edges);
         if distance.doubtful.bits() != 0 {
-            return self.doubtful_triangle(corners, t_max);
+            return self.doubtful_triangle(corners, t_max, distance.close.bits() != 0);
         }
         let [_, v, w] = edges.weights;
         let inverse = distance.inverse_determinant;
@@ -161,8 +171,19 @@ impl Probe {
     ///
     /// The weighted mean of the corners' distances is no more exact than the largest of them. Near to the
     /// origin of the ray that is not enough: a ray that starts on a large triangle would hit it. And the
-    /// weights themselves are mostly rounding where the triangle is thin.
-    pub(super) fn doubtful_triangle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
+    /// weights themselves are mostly rounding where the triangle is thin. If it is `close` ([`Distance`]), most often
+    /// because the ray starts on it, the plane alone may tell: whatever the border, it says the same.
+    pub(super) fn doubtful_triangle(
+        &self,
+        corners: &[Vec3; 3],
+        t_max: f32,
+        close: bool,
+    ) -> Option<TriangleHit> {
+        // A ray away from the plane is away from the triangle, whatever its border is nearest to.
+        let plane = self.plane(corners);
+        if close && plane <= 0.0 {
+            return None;
+        }
         let [x, y, z] = AXES[self.axis];
         let direction = self.direction.as_dvec3();
         let (shear_x, shear_y) = (direction[x] / direction[z], direction[y] / direction[z]);
@@ -177,14 +198,18 @@ impl Probe {
         let weights =
             if outside || determinant == 0.0 { nearest_on_border(&p) } else { weights / determinant };
         let depth = weights.x * p[0].z + weights.y * p[1].z + weights.z * p[2].z;
-        // A ray away from the plane is away from the triangle, whatever its border is nearest to.
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let normal = (b - a).cross(c - a);
-        let plane = normal.dot(a - self.origin.as_dvec3()) / normal.dot(direction);
         let t = if plane.is_nan() || outside { depth / direction[z] } else { plane };
         let leaves = plane <= 0.0 && t <= self.reach_of(&p) * f64::from(CANCELLATION);
         let hit = TriangleHit { t: t as f32, u: weights.y as f32, v: weights.z as f32 };
         if leaves { None } else { within(hit, t_max) }
+    }
+
+    /// Where the ray meets the triangle's plane; not a number if it has none.
+    #[inline(always)]
+    fn plane(&self, corners: &[Vec3; 3]) -> f64 {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let normal = (b - a).cross(c - a);
+        normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3())
     }
 
     /// Of the farthest corner, in multiples of the direction.

@@ -56,10 +56,11 @@ impl Identity {
                 Some(Filter::Bilinear) => "bilinear".to_owned(),
             },
             sampling: format!(
-                "{:?}, {:?}{}",
+                "{:?}, {:?}{}{}",
                 settings.sampling,
                 settings.pixel_sampling.unwrap_or(settings.sampling),
-                if settings.shafts { "" } else { ", no shafts" }
+                if settings.shafts { "" } else { ", no shafts" },
+                if settings.reuse { "" } else { ", no reuse" }
             )
             .to_lowercase(),
             seed: settings.seed,

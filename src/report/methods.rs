@@ -1,7 +1,7 @@
 //! What is compared: one table, a row for each way to render. A new technique that can be switched is a
 //! new row here and a field of [`RenderSettings`].
 
-use crate::trace::{RenderSettings, Sampling};
+use crate::trace::{Integrator, RenderSettings, Sampling};
 
 /// One way to render.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +16,8 @@ pub struct Method {
     pub ablation: bool,
     /// More samples where there is more noise.
     pub adaptive: bool,
+    /// Makes a difference with this integrator alone.
+    pub only: Option<Integrator>,
     /// What it changes in the settings.
     pub apply: fn(&mut RenderSettings),
 }
@@ -26,13 +28,14 @@ pub const OURS: &str = "ours";
 pub const RANDOM: &str = "random";
 
 /// All of them, in the order of the tables.
-pub const METHODS: [Method; 8] = [
+pub const METHODS: [Method; 9] = [
     Method {
         name: RANDOM,
         title: "plain random",
         changes: "every number independent, as the ancestor sampled its area lights",
         ablation: false,
         adaptive: false,
+        only: None,
         apply: |settings| settings.sampling = Sampling::Independent,
     },
     Method {
@@ -41,6 +44,7 @@ pub const METHODS: [Method; 8] = [
         changes: "a jittered grid of 4 × 4 cells, over and over",
         ablation: false,
         adaptive: false,
+        only: None,
         apply: |settings| settings.sampling = Sampling::Stratified,
     },
     Method {
@@ -50,6 +54,7 @@ pub const METHODS: [Method; 8] = [
                   there is more noise",
         ablation: false,
         adaptive: true,
+        only: None,
         apply: |_| {},
     },
     Method {
@@ -58,6 +63,7 @@ pub const METHODS: [Method; 8] = [
         changes: "the same number of samples for every pixel",
         ablation: true,
         adaptive: false,
+        only: None,
         apply: |_| {},
     },
     Method {
@@ -66,7 +72,17 @@ pub const METHODS: [Method; 8] = [
         changes: "light that nothing can block is sampled too",
         ablation: true,
         adaptive: true,
+        only: None,
         apply: |settings| settings.shafts = false,
+    },
+    Method {
+        name: "no-reuse",
+        title: "ours − reuse",
+        changes: "each pixel follows its own paths alone",
+        ablation: true,
+        adaptive: true,
+        only: Some(Integrator::Path),
+        apply: |settings| settings.reuse = false,
     },
     Method {
         name: "shifted",
@@ -74,6 +90,7 @@ pub const METHODS: [Method; 8] = [
         changes: "the same sequences with a random shift in place of Owen's scrambling",
         ablation: true,
         adaptive: true,
+        only: None,
         apply: |settings| settings.sampling = Sampling::Shifted,
     },
     Method {
@@ -82,6 +99,7 @@ pub const METHODS: [Method; 8] = [
         changes: "independent places in the pixel, the rest as ours",
         ablation: true,
         adaptive: true,
+        only: None,
         apply: |settings| settings.pixel_sampling = Some(Sampling::Independent),
     },
     Method {
@@ -90,12 +108,18 @@ pub const METHODS: [Method; 8] = [
         changes: "independent samples of lights and bounces, the places in the pixel as ours",
         ablation: true,
         adaptive: true,
+        only: None,
         apply: |settings| {
             settings.sampling = Sampling::Independent;
             settings.pixel_sampling = Some(Sampling::Sobol);
         },
     },
 ];
+
+/// Those that make a difference with this integrator.
+pub fn methods(integrator: Integrator) -> impl Iterator<Item = &'static Method> {
+    METHODS.iter().filter(move |method| method.only.is_none_or(|only| only == integrator))
+}
 
 #[cfg(test)]
 mod tests {

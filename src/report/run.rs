@@ -4,7 +4,7 @@ use super::curve::{Findings, Measure};
 use super::facts::Facts;
 use super::machine::Machine;
 use super::measure::{Performance, Run, Subject, Tracing, run, surfaces, traceable};
-use super::methods::{METHODS, Method, OURS, RANDOM};
+use super::methods::{Method, OURS, RANDOM, methods};
 use super::pictures::Pictures;
 use super::plan::Plan;
 use super::reference::{self, Reference};
@@ -56,7 +56,7 @@ pub fn measure_all(
     job: &ReportJob,
     mut progress: impl FnMut(&ReportProgress),
 ) -> Result<Report, ReportError> {
-    let others = METHODS.len() - 1;
+    let others = methods(job.wishes.integrator.unwrap_or_default()).count() - 1;
     let plan = Plan::new(job.total, job.scenes.len(), others, job.seeds);
     let size = job.wishes.size.unwrap_or(RenderSettings::default().size);
     let names = names(&job.scenes);
@@ -164,7 +164,7 @@ type Kept = Vec<(&'static str, LinearImage)>;
 /// The first runs of all methods, then the second ones and so on, so that an interruption leaves some of
 /// each; and of each first run its picture.
 fn all_methods(subject: &Subject, name: &str, plan: &Plan, clock: &mut Clock) -> (Measured, Kept) {
-    let mut measured: Measured = METHODS.iter().map(|method| (method, Vec::new())).collect();
+    let mut measured: Measured = methods(subject.settings.integrator).map(|method| (method, Vec::new())).collect();
     let mut kept = Vec::new();
     for seed in 0..plan.seeds {
         for (method, runs) in &mut measured {

@@ -267,6 +267,8 @@ impl Job for IntegrateQuad<'_> {
 pub struct Depart<'a> {
     /// The points.
     pub block: &'a Block,
+    /// Random numbers.
+    pub samplers: &'a SamplerRow<LANES>,
     /// Which pair of random numbers.
     pub dimension: u32,
     /// What comes out.
@@ -278,9 +280,9 @@ impl Job for Depart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { block, dimension, out } = self;
+        let Self { block, samplers, dimension, out } = self;
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        block.samplers.pairs(dimension, &mut x, &mut y);
+        samplers.pairs(dimension, &mut x, &mut y);
         for i in 0..LANES {
             let normal = block.normal.get(i);
             let local = cosine_hemisphere(Vec2::new(x[i], y[i]));

@@ -11,6 +11,7 @@ use super::integrator::{
 };
 use super::light::FlatLight;
 use super::quad::Quad;
+use super::reuse::{End, Start};
 use super::shape_light::{Shape, ShapeLight};
 use super::sightlines::{Sightlines, Window};
 use super::surface::Interaction;
@@ -184,6 +185,16 @@ fn seen_past(
     irradiance(quad, point, [block.normal.get(i), block.geometric_normal.get(i)], blockers, which)
 }
 
+/// Where a path has arrived, as others see it.
+fn end_at(at: &Interaction) -> End {
+    let normal = at.geometric_normal;
+    if at.normal.dot(at.wo) > 0.0 && at.normal.dot(normal) > 0.0 {
+        End::Seen { target: at.origin_toward(normal), normal, shading: at.normal }
+    } else {
+        End::Alone
+    }
+}
+
 impl Batch {
     /// What comes from all points that [`Diffuse::add`] has noted.
     pub(super) fn shade_diffuse(&mut self, scene: &TraceScene) {
@@ -193,6 +204,9 @@ impl Batch {
                 let like = self.path(chunk[0].path as usize).sampler;
                 let mut block = self.diffuse.block.take().unwrap_or_else(|| Box::new(Block::new(like)));
                 self.fill(scene, &mut block, chunk, kind < 2);
+                if kind < 2 {
+                    self.note_ends(&block);
+                }
                 self.diffuse.counted.clear();
                 self.diffuse.counted.resize(chunk.len(), 0);
                 self.light_block(scene, &block);
@@ -206,7 +220,7 @@ impl Batch {
         }
     }
 
-    fn fill(&self, scene: &TraceScene, block: &mut Block, points: &[Arrived], flat: bool) {
+    fn fill(&mut self, scene: &TraceScene, block: &mut Block, points: &[Arrived], flat: bool) {
         block.count = points.len();
         for (i, arrived) in points.iter().enumerate() {
             let path = self.path(arrived.path as usize);
@@ -225,6 +239,7 @@ impl Batch {
                 block.direction.set(i, path.ray.direction);
             } else {
                 let mut at = Interaction::new(scene, instance, hit, &path.ray);
+                self.reuse.end(&path, end_at(&at));
                 at.normal = facing(at.normal, &at);
                 let texel = scene.texture(surface.base_color_texture, at.uvs) * at.color;
                 albedo *= texel.truncate();
@@ -234,6 +249,17 @@ impl Batch {
         }
         if flat {
             block.find_points(scene.geometry.tlas.isa());
+        }
+    }
+
+    /// Where diverted paths have arrived that are on flat triangles.
+    fn note_ends(&mut self, block: &Block) {
+        if self.reuse.on {
+            for i in 0..block.count {
+                let normal = block.geometric_normal.get(i);
+                let end = End::Seen { target: block.origin.get(i), normal, shading: normal };
+                self.reuse.end(&self.path(block.paths[i] as usize), end);
+            }
         }
     }
 
@@ -345,7 +371,16 @@ impl Batch {
         let depth = self.path(block.paths[0] as usize).depth;
         let base = 1 + depth * PAIRS_PER_BOUNCE;
         let mut out = std::mem::take(&mut self.diffuse.departures);
-        scene.geometry.tlas.isa().run(Depart { block, dimension: base + DIRECTION, out: &mut out });
+        let mut samplers = block.samplers.clone();
+        let shares = self.reuse.on && depth == 0;
+        if shares {
+            for i in 0..block.count {
+                let sampler = self.shared_sampler(self.path(block.paths[i] as usize).entry);
+                samplers.set(i, &sampler);
+            }
+        }
+        let dimension = base + DIRECTION;
+        scene.geometry.tlas.isa().run(Depart { block, samplers: &samplers, dimension, out: &mut out });
         for i in 0..block.count {
             let path = self.path(block.paths[i] as usize);
             let mut throughput = block.throughput.get(i);
@@ -360,14 +395,21 @@ impl Batch {
                 }
                 throughput /= survival;
             }
-            let direction = out.direction.get(i);
+            let (origin, direction, normal) =
+                (block.origin.get(i), out.direction.get(i), block.normal.get(i));
+            let mut sampler = path.sampler;
+            if shares {
+                let side = block.geometric_normal.get(i);
+                self.reuse.start(path.entry, Start { origin, normal, side, throughput });
+                sampler = self.shared_sampler(path.entry);
+            }
             self.next.push(Path {
                 entry: path.entry,
-                sampler: path.sampler,
-                ray: Ray::new(block.origin.get(i), direction),
+                sampler,
+                ray: Ray::new(origin, direction),
                 throughput,
                 depth: depth + 1,
-                bounce: Some(Bounce { pdf, normal: block.normal.get(i), counted: self.diffuse.counted[i] }),
+                bounce: Some(Bounce { pdf, normal, counted: self.diffuse.counted[i] }),
                 last: false,
                 absorption: Vec3::ZERO,
             });

@@ -11,6 +11,7 @@ use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::{FlatLight, LightSample};
 use super::pass::RayCounts;
+use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
 use super::scene::Surface;
 use super::surface::Interaction;
@@ -85,19 +86,20 @@ const TOGETHER: u32 = 2048;
 #[derive(Debug, Default)]
 pub struct Batch {
     /// Top left corners and samplers of the tile's pixels.
-    pixels: Vec<(Vec2, [Sampler; 2])>,
+    pub(super) pixels: Vec<(Vec2, [Sampler; 2])>,
     work: Work,
     pub(super) paths: Vec<Path>,
     pub(super) next: Vec<Path>,
     pub(super) shadows: Vec<Shadow>,
     pub(super) diffuse: Diffuse,
+    pub(super) reuse: Reuse,
     pub(super) rays: Vec<Ray>,
     pub(super) hits: Vec<Option<Hit>>,
     ignored: Vec<Option<(u32, u32)>>,
     blocked: Vec<bool>,
     pub(super) radiance: Vec<Vec3>,
-    /// Which of `pixels`, and which sample: all of one pixel, then of the next.
-    keys: Vec<(u32, u32)>,
+    /// Which of `pixels`, and which sample: all of one pixel, then of another.
+    pub(super) keys: Vec<(u32, u32)>,
 }
 
 /// Dimensions of the sampler: pair 0 is the place in the pixel, 1 that on the lens; a bounce has this many pairs
@@ -116,7 +118,9 @@ impl Batch {
         self.keys.clear();
         self.work = work;
         let pixels = tile.size.element_product();
+        self.reuse.enter(scene, tile.size);
         match work {
+            _ if self.reuse.on => self.begin_groups(tile, work, TOGETHER),
             Work::Even { until } => {
                 let first = tile.next_sample;
                 let count = until.saturating_sub(first).min((TOGETHER / pixels).max(1));
@@ -149,7 +153,10 @@ impl Batch {
         self.diffuse.enter(scene, tile, size);
         self.look(scene, size);
         self.radiance.clear();
-        self.radiance.resize(self.keys.len(), Vec3::ZERO);
+        // What is shared comes after what is each one's own.
+        let banks = if self.reuse.on { 2 } else { 1 };
+        self.radiance.resize(banks * self.keys.len(), Vec3::ZERO);
+        self.reuse.begin(self.keys.len());
         rays.camera += self.rays.len() as u64;
         self.paths.clear();
         self.wave(scene, rays);
@@ -158,6 +165,7 @@ impl Batch {
             self.rays.extend(self.paths.iter().map(|path| path.ray));
             self.wave(scene, rays);
         }
+        rays.shadow += self.share(scene);
         self.diffuse.leave(tile);
         let mut dropped = 0;
         let pixels = tile.pixels_mut();
@@ -285,6 +293,9 @@ impl Batch {
         if surface.is_diffuse() && path.absorption == Vec3::ZERO {
             if !path.last && path.depth < scene.settings.max_depth {
                 self.diffuse.add(scene, index, &hit, path.depth);
+                if let Some(path) = self.paths.get_mut(index) {
+                    self.reuse.divert(path);
+                }
             }
             return;
         }

@@ -20,6 +20,7 @@ pub mod noise;
 pub mod pass;
 pub mod place;
 pub mod quad;
+mod reuse;
 pub mod sampler;
 pub mod scene;
 pub mod settings;

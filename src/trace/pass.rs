@@ -1,7 +1,7 @@
 //! Tiles over threads.
 
 use super::integrator::{Batch, Work};
-use super::{Film, TraceScene, allot};
+use super::{Film, TraceScene, allot, reuse};
 use rayon::prelude::*;
 
 /// Rays by kind.
@@ -47,7 +47,10 @@ pub fn trace_adaptive(
     }
     let rays = trace_pass(scene, film, until.min(allot::EVEN), step, keep_going);
     if film.complete_samples() == allot::EVEN {
-        let shares = allot::shares(film);
+        let mut shares = allot::shares(film);
+        if reuse::is_on(scene.settings) {
+            reuse::even_out(&mut shares, film.size().x as usize);
+        }
         film.allot(&shares);
     }
     rays

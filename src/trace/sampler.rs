@@ -58,6 +58,14 @@ impl Sampler {
         Self { index: index >> 1, ..self }
     }
 
+    /// Number `member` of `members` samplers of this sample, which together over all samples are as even as those of
+    /// one pixel. They repeat after 2³² numbers.
+    #[must_use]
+    pub fn shared(self, member: u32, members: u32) -> Self {
+        let index = self.index.wrapping_mul(members).wrapping_add(member);
+        Self { seed: hash(self.seed ^ 0x2545_f491), index, ..self }
+    }
+
     /// The same, its numbers spread as `settings` say.
     #[must_use]
     pub fn spread(self, settings: &RenderSettings) -> Self {

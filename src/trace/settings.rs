@@ -24,6 +24,8 @@ pub struct RenderSettings {
     pub pixel_sampling: Option<Sampling>,
     /// Whether light is computed instead of sampled where nothing can be in its way.
     pub shafts: bool,
+    /// Whether neighbours share what their paths find.
+    pub reuse: bool,
 }
 
 /// How the random numbers of a pixel are spread over its samples. All give the same picture in the end;
@@ -73,6 +75,7 @@ impl Default for RenderSettings {
             sampling: Sampling::Sobol,
             pixel_sampling: None,
             shafts: true,
+            reuse: true,
         }
     }
 }
