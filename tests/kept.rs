@@ -125,8 +125,8 @@ fn a_moving_picture_is_nearer_to_the_truth_with_old_samples() {
     let kitchen = shared.join("obj/kitchen/kitchen.obj").display().to_string();
     let mut flights = vec![
         ("cornell", Integrator::Direct, 0.95),
-        ("cornell", Integrator::Path, 0.5),
-        ("gallery", Integrator::Direct, 0.5),
+        ("cornell", Integrator::Path, 0.7),
+        ("gallery", Integrator::Direct, 0.7),
     ];
     if Path::new(&kitchen).is_file() {
         flights.push((kitchen.as_str(), Integrator::Direct, 0.7));

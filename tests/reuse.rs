@@ -96,7 +96,9 @@ fn sharing_changes_no_mean_and_lowers_the_noise() {
         let chi2 = sum / count;
         let deviations = bias / (error * 3.0 * 32.0).sqrt();
         let ratio = other_variance * 4.0 / variance;
-        println!("sheet {sheet}: mean z² {chi2:.3}, bias {deviations:+.2} σ, variance 1/{ratio:.1} at equal samples");
+        println!(
+            "sheet {sheet}: mean z² {chi2:.3}, bias {deviations:+.2} σ, variance 1/{ratio:.1} at equal samples"
+        );
         assert!(deviations.abs() < 4.5, "biased by {deviations} σ");
         assert!((0.7..1.35).contains(&chi2), "mean z² is {chi2}");
         assert!(ratio > gain, "only {ratio}");

@@ -164,7 +164,8 @@ type Kept = Vec<(&'static str, LinearImage)>;
 /// The first runs of all methods, then the second ones and so on, so that an interruption leaves some of
 /// each; and of each first run its picture.
 fn all_methods(subject: &Subject, name: &str, plan: &Plan, clock: &mut Clock) -> (Measured, Kept) {
-    let mut measured: Measured = methods(subject.settings.integrator).map(|method| (method, Vec::new())).collect();
+    let mut measured: Measured =
+        methods(subject.settings.integrator).map(|method| (method, Vec::new())).collect();
     let mut kept = Vec::new();
     for seed in 0..plan.seeds {
         for (method, runs) in &mut measured {

@@ -22,7 +22,7 @@ const NEAR: f32 = 4.0;
 /// plane), and the share of them that may see an edge, so that their pixels are looked at one by one.
 const EFFORTS: [([u32; 2], f32); 4] = [([8, 8], 0.0), ([4, 8], 0.0), ([4, 4], 0.1), ([2, 4], 0.2)];
 /// Seconds of carrying over above which one looks less closely, and below which more.
-const SECONDS: [f64; 2] = [0.005, 0.010];
+const SECONDS: [f64; 2] = [0.007, 0.013];
 /// A preview that counts less than this share of the old samples is left out.
 const NOTABLE: f32 = 0.02;
 /// Old pixels that are worth less are left alone, samples.
