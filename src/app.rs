@@ -1,9 +1,10 @@
 //! The World and the one list of systems.
 
-use crate::image::develop::{Display, Picture, develop};
+use crate::image::develop::{Display, Picture};
 use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, load};
 use crate::preview::Preview;
 use crate::scene::{Playing, deform, play, propagate_transforms};
+use crate::shown::{Shown, develop_film, keep};
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin, Traceable};
 use crate::trace::noise;
 use crate::trace::{
@@ -51,6 +52,8 @@ pub struct FrameBudget {
     pub sample_target: u32,
     /// Samples per pixel of one pass, if there is no time limit.
     pub pass_samples: u32,
+    /// Only this part of the picture is refined, from its first pixel to the one after its last.
+    pub region: Option<[UVec2; 2]>,
     /// For somebody who watches: a coarse whole picture first when the film was reset.
     pub preview: bool,
     /// For somebody who watches: a developed [`Picture`] at the end of each frame.
@@ -65,6 +68,7 @@ impl Default for FrameBudget {
             adaptive: false,
             sample_target: 64,
             pass_samples: 1,
+            region: None,
             preview: false,
             develop: false,
         }
@@ -92,6 +96,8 @@ pub struct FrameStats {
     pub rays_per_second: f64,
     /// Side of a preview pixel, if the picture is still partly a preview.
     pub preview_scale: Option<u32>,
+    /// Seconds that the last preview took.
+    pub preview_seconds: f64,
     /// Samples dropped because they were not finite.
     pub dropped: u64,
     /// Whether the last frame was the first one of this picture.
@@ -114,6 +120,7 @@ impl App {
         world.init_resource::<Display>();
         world.init_resource::<Picture>();
         world.init_resource::<Preview>();
+        world.init_resource::<Shown>();
         world.init_resource::<FrameBudget>();
         world.init_resource::<FrameStats>();
         world.init_resource::<Geometry>();
@@ -204,7 +211,7 @@ fn frame_schedule() -> Schedule {
         )
             .chain()
             .in_set(Sync),
-        trace_frame.in_set(Trace),
+        (trace_frame, keep).chain().in_set(Trace),
         develop_film.run_if(is_worth_developing).in_set(Present),
     ));
     frame
@@ -230,6 +237,10 @@ pub fn trace_frame(
     let target = budget.sample_target.min(u32::MAX - film.first_sample());
     let mut start = Instant::now();
     let mut seconds = 0.0;
+    // Not each time: it would count as a change of the film.
+    if film.region() != budget.region {
+        film.confine(budget.region);
+    }
     let mut rays = RayCounts::default();
     // Once for each reset: a preview that came anew each frame would leave no time for anything else.
     stats.begun = std::mem::replace(&mut *previewed, redone.resets) != redone.resets;
@@ -241,11 +252,14 @@ pub fn trace_frame(
                 Some(counts) => rays = rays + counts,
                 // So cheap that the film's own first pass is the preview.
                 None => {
+                    film.confine(None);
                     rays = rays + trace_pass(&scene, &mut film, target.min(1), 1, || true);
                     preview.note(start.elapsed(), f64::from(scene.settings.size.element_product()));
+                    film.confine(budget.region);
                 }
             }
             seconds = start.elapsed().as_secs_f64();
+            stats.preview_seconds = seconds;
             start = Instant::now();
         }
     }
@@ -254,7 +268,7 @@ pub fn trace_frame(
     while film.complete_samples() < target && keep_going() {
         let step = budget.pass_samples;
         rays = rays
-            + if budget.adaptive {
+            + if budget.adaptive && (budget.region.is_none() || film.is_allotted()) {
                 trace_adaptive(&scene, &mut film, target, step, keep_going)
             } else {
                 trace_pass(&scene, &mut film, target, step, keep_going)
@@ -285,19 +299,5 @@ pub fn trace_frame(
         stats.noise = noise.map(|noise| noise.relative);
         stats.noise_doubt = noise.map_or(0.0, |noise| noise.doubt);
         stats.noise_samples = complete;
-    }
-}
-
-/// Film → [`Picture`], when either it or the way of showing it has changed.
-pub fn develop_film(
-    film: Res<Film>,
-    preview: Res<Preview>,
-    display: Res<Display>,
-    mut picture: ResMut<Picture>,
-) {
-    if film.is_changed() || display.is_changed() {
-        picture.size = film.size();
-        picture.rgba = develop(&film, preview.film(), &display);
-        picture.version += 1;
     }
 }

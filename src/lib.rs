@@ -17,6 +17,7 @@ pub mod preview;
 pub mod render;
 pub mod report;
 pub mod scene;
+pub mod shown;
 pub mod sync;
 pub mod torture;
 pub mod trace;

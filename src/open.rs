@@ -4,13 +4,14 @@ use crate::app::{App, FrameBudget};
 use crate::bvh::Isa;
 use crate::first_look;
 use crate::image::{Display, ToneMap};
-use crate::load::{LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
+use crate::load::{Card, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform};
 use crate::sync::{Instructions, RenderOrigin};
 use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// What the user asks for; `None` leaves it to the scene's settings file, then to the default.
@@ -143,8 +144,14 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     app.build();
     first_look::settle(&mut app, &mut report, &source.to_string(), exposure.is_none());
     let build_seconds = start.elapsed().as_secs_f64();
+    let card = Card::of(&source.to_string(), &report).text();
+    app.world.insert_resource(LoadCard(card.into()));
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
 }
+
+/// What `check` says of the scene in a world.
+#[derive(Resource, Clone, Debug)]
+pub struct LoadCard(pub Arc<str>);
 
 /// Where the scene in a world comes from, to load or to speak of it again.
 #[derive(Resource, Clone, Debug)]

@@ -10,10 +10,14 @@ pub struct Preview {
     film: Option<Film>,
     scale: u32,
     seconds_per_pixel: Option<f64>,
+    /// Seconds of a first picture that others need.
+    reserved: f64,
 }
 
-/// Time that a preview may take.
+/// Time that a preview may take, with what is carried over from the picture before.
 const TARGET: Duration = Duration::from_millis(14);
+/// Of that, what is left to the preview in any case.
+const OWN: f64 = 0.35;
 /// A finer step is taken only if it is expected to need less than this part of [`TARGET`]: without the
 /// gap two steps would alternate.
 const HEADROOM: f64 = 0.7;
@@ -22,7 +26,7 @@ const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
 impl Default for Preview {
     fn default() -> Self {
-        Self { film: None, scale: 8, seconds_per_pixel: None }
+        Self { film: None, scale: 8, seconds_per_pixel: None, reserved: 0.0 }
     }
 }
 
@@ -54,6 +58,11 @@ impl Preview {
         self.seconds_per_pixel = Some(self.seconds_per_pixel.map_or(measured, |old| 0.5 * (old + measured)));
     }
 
+    /// Leaves this much of the time to others.
+    pub fn reserve(&mut self, time: Duration) {
+        self.reserved = 0.5 * (self.reserved + time.as_secs_f64());
+    }
+
     /// The coarse film, if the last preview needed one.
     #[must_use]
     pub fn film(&self) -> Option<&Film> {
@@ -68,7 +77,9 @@ impl Preview {
 
     fn choose_scale(&mut self, pixels: f64) {
         let Some(seconds_per_pixel) = self.seconds_per_pixel else { return };
-        let cost = |scale: u32| seconds_per_pixel * pixels / f64::from(scale * scale) / TARGET.as_secs_f64();
+        let target = TARGET.as_secs_f64();
+        let target = (target - self.reserved).max(OWN * target);
+        let cost = |scale: u32| seconds_per_pixel * pixels / f64::from(scale * scale) / target;
         let fits = |limit: f64| SCALES.into_iter().find(|&s| cost(s) <= limit).unwrap_or(16);
         if cost(self.scale) > 1.0 {
             self.scale = fits(1.0);
@@ -83,7 +94,7 @@ mod tests {
     use super::*;
 
     fn at(scale: u32, ms_at_full: f64) -> u32 {
-        let mut preview = Preview { film: None, scale, seconds_per_pixel: Some(ms_at_full * 1e-3) };
+        let mut preview = Preview { scale, seconds_per_pixel: Some(ms_at_full * 1e-3), ..Preview::default() };
         preview.choose_scale(1.0);
         preview.scale
     }

@@ -122,6 +122,12 @@ pub struct WindowArgs {
     /// Write down what the user does, for --replay
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     pub record: Option<PathBuf>,
+    /// Show no samples of the view before while moving (Y)
+    #[arg(long)]
+    pub no_kept_samples: bool,
+    /// Never show the picture smoothed in its first second (U)
+    #[arg(long)]
+    pub no_smoothing: bool,
     /// Keys of your own [default: penumbra/keys.toml in your folder of settings, such as ~/.config]
     #[arg(long, value_name = "FILE.toml")]
     pub keys: Option<PathBuf>,
@@ -183,6 +189,12 @@ pub struct SceneArgs {
     /// Settings file to use instead of the .toml beside the scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
+    /// A picture of all directions (.hdr or .exr, longitude by latitude) that lights the scene in place of its own sky
+    #[arg(long, value_name = "FILE")]
+    pub hdri: Option<PathBuf>,
+    /// Edits that were not saved, as a screenshot knows them
+    #[arg(long, value_name = "TOML", hide = true)]
+    pub edits: Option<String>,
     /// What of a file that holds several scenes, variants or poses.
     #[command(flatten)]
     pub part: PartArgs,
@@ -491,7 +503,11 @@ impl SceneArgs {
     /// How to load it.
     #[must_use]
     pub fn load_options(&self) -> LoadOptions {
-        self.part.load_options(self.scene_settings.clone())
+        LoadOptions {
+            edits: self.edits.clone(),
+            sky: self.hdri.clone(),
+            ..self.part.load_options(self.scene_settings.clone())
+        }
     }
 
     /// How it should look.

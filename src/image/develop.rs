@@ -6,7 +6,7 @@ use crate::scene::color::{luminance, srgb_from_linear};
 use crate::trace::Film;
 use crate::trace::sampler::{hash, unit_float};
 use bevy_ecs::prelude::*;
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec3, Vec4};
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
@@ -84,19 +84,38 @@ pub fn develop(film: &Film, coarse: Option<&Film>, display: &Display) -> Vec<u8>
                 rgba.copy_from_slice(&shown[from as usize * 4..][..4]);
                 continue;
             }
-            // After exposure, before the curve: even an infinity is white, not NaN.
-            let exposed = (pixel.mean().as_vec3() * gain).clamp(Vec3::ZERO, Vec3::splat(1e6));
-            let shown = display.tone_map.apply(exposed);
-            let dither = unit_float(hash(x ^ hash(y))) - 0.5;
-            for (byte, linear) in rgba.iter_mut().zip(shown.to_array()) {
-                // Black and white stay what they are.
-                let dither = if linear > 0.0 && linear < 1.0 { dither } else { 0.0 };
-                // The cast saturates.
-                *byte = (SRGB_LEVELS.at(linear) + dither + 0.5) as u8;
-            }
+            write(pixel.mean().as_vec3(), [x, y], gain, display, rgba);
         }
     });
     bytes
+}
+
+/// Linear pixels of `size` as bytes, in the same way, into `bytes`; what is beside a colour is left out.
+pub fn develop_linear(pixels: &[Vec4], size: UVec2, display: &Display, bytes: &mut [u8]) {
+    let gain = display.exposure.exp2();
+    let width = size.x as usize;
+    bytes.par_chunks_exact_mut(width * 4).zip(pixels.par_chunks_exact(width)).zip(0..size.y).for_each(
+        |((row, pixels), y)| {
+            for ((x, pixel), rgba) in (0..size.x).zip(pixels).zip(row.chunks_exact_mut(4)) {
+                write(pixel.truncate(), [x, y], gain, display, rgba);
+            }
+        },
+    );
+}
+
+/// The colour of one pixel.
+#[inline]
+fn write(radiance: Vec3, [x, y]: [u32; 2], gain: f32, display: &Display, rgba: &mut [u8]) {
+    // After exposure, before the curve: even an infinity is white, not NaN.
+    let exposed = (radiance * gain).clamp(Vec3::ZERO, Vec3::splat(1e6));
+    let shown = display.tone_map.apply(exposed);
+    let dither = unit_float(hash(x ^ hash(y))) - 0.5;
+    for (byte, linear) in rgba.iter_mut().zip(shown.to_array()) {
+        // Black and white stay what they are.
+        let dither = if linear > 0.0 && linear < 1.0 { dither } else { 0.0 };
+        // The cast saturates.
+        *byte = (SRGB_LEVELS.at(linear) + dither + 0.5) as u8;
+    }
 }
 
 /// A linear picture as bytes, in the same way.

@@ -55,19 +55,28 @@ impl Card {
     /// The card of a file that was loaded or refused.
     #[must_use]
     pub fn new(file: &str, loaded: &Result<LoadReport, LoadError>) -> Self {
-        let report = loaded.as_ref().ok();
+        Self::from_parts(file, loaded.as_ref().ok(), loaded.as_ref().err())
+    }
+
+    /// The card of a file that was loaded.
+    #[must_use]
+    pub fn of(file: &str, report: &LoadReport) -> Self {
+        Self::from_parts(file, Some(report), None)
+    }
+
+    fn from_parts(file: &str, report: Option<&LoadReport>, error: Option<&LoadError>) -> Self {
         let of = |kind| report.into_iter().flat_map(|report| report.of(kind)).cloned().collect();
         let [repaired, ignored, approximated, decided]: [Vec<Remark>; 4] =
             [Kind::Repaired, Kind::Ignored, Kind::Approximated, Kind::Decided].map(of);
         let is_whole = repaired.is_empty() && ignored.is_empty() && approximated.is_empty();
         Self {
             file: file.to_owned(),
-            verdict: match loaded {
-                Err(_) => Verdict::Refused,
-                Ok(_) if is_whole => Verdict::Valid,
-                Ok(_) => Verdict::Repaired,
+            verdict: match report {
+                None => Verdict::Refused,
+                Some(_) if is_whole => Verdict::Valid,
+                Some(_) => Verdict::Repaired,
             },
-            error: loaded.as_ref().err().map(ToString::to_string),
+            error: error.map(ToString::to_string),
             triangles: report.map_or(0, |report| report.triangles),
             found: report.map_or_else(Found::default, |report| report.found.clone()),
             seconds: report.map_or_else(Vec::new, |report| report.seconds.clone()),

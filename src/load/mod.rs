@@ -22,6 +22,7 @@ mod obj;
 mod picture;
 mod report;
 pub mod settings;
+mod sky;
 mod source;
 mod tangents;
 
@@ -33,10 +34,11 @@ pub use made::Made;
 pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
-use crate::scene::{ActiveCamera, Playing, Transform, deform, play, propagate_transforms};
+use crate::scene::{ActiveCamera, Light, Playing, Transform, deform, play, propagate_transforms};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
+use glam::Vec3;
 use report::Sink;
 use settings::{Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
@@ -113,6 +115,10 @@ pub struct LoadOptions {
     pub max_memory: Option<u64>,
     /// Who is told how far it is.
     pub watcher: Watcher,
+    /// A picture of all directions that lights the scene in place of its own sky.
+    pub sky: Option<PathBuf>,
+    /// `[[edit]]` tables, as a settings file has them, that are applied last.
+    pub edits: Option<String>,
     /// Which animation, by name or by number from 0, instead of the first and those of other things.
     pub animation: Option<String>,
 }
@@ -144,6 +150,9 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         settings.push(Settings::parse(&file, folder.clone(), &bytes)?);
     }
     settings.extend(sidecar(source, format, options, sink)?);
+    if let Some(edits) = &options.edits {
+        settings.push(Settings::parse("edits", folder.clone(), edits.as_bytes())?);
+    }
     let mut materials = Materials::default();
     let mut active = None;
     for settings in &settings {
@@ -161,6 +170,11 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     }
     for settings in &settings {
         settings.spawn_lights(sink)?;
+    }
+    if let Some(path) = &options.sky {
+        let light = Light::Sky { sky: sky::read(path, &sink.budget)?, scale: Vec3::ONE };
+        sink.spawn((Name::new("sky"), Transform::default(), light));
+        sink.decide(&file, format!("its sky is {}", path.display()));
     }
     for settings in &settings {
         settings.apply_edits(sink)?;

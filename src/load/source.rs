@@ -35,6 +35,14 @@ impl Folder {
         }
     }
 
+    /// Where a file that one's own settings name is; `None` in a built-in scene.
+    pub(super) fn path(&self, reference: &str) -> Option<PathBuf> {
+        match self {
+            Self::Disk(folder) => Some(folder.join(reference)),
+            Self::BuiltIn => None,
+        }
+    }
+
     /// Reads what a downloaded scene names: inside this folder only. `\` counts as `/`, and a name
     /// that differs only in case is found too.
     pub(super) fn read(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {

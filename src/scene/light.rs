@@ -1,5 +1,6 @@
 //! Lights that are not part of a mesh. (An emissive [`super::Material`] makes its mesh a light.)
 
+use super::Sky;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 
@@ -70,6 +71,13 @@ pub enum Light {
     Environment {
         /// Radiance, W/(m² sr).
         radiance: Vec3,
+    },
+    /// Everywhere beyond the scene, another in each direction; no place.
+    Sky {
+        /// Its picture, in local directions.
+        sky: Sky,
+        /// Multiplies the picture's radiance.
+        scale: Vec3,
     },
 }
 

@@ -14,6 +14,7 @@ pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod path;
+mod sky;
 pub mod texture;
 pub mod transform;
 
@@ -26,5 +27,6 @@ pub use layers::{Anisotropy, Body, Clearcoat, Layers, Sheen, Transmission};
 pub use light::{Emission, Light, Visible};
 pub use material::{Alpha, Glass, Glossy, Material, NormalMap, TextureUse};
 pub use mesh::{Instance, Mesh, TriangleMesh};
+pub use sky::{Sky, rotation};
 pub use texture::{Encoding, Filter, Texels, Texture, Wrap};
 pub use transform::{GlobalTransform, Transform, propagate_transforms};

@@ -2,12 +2,13 @@
 
 use super::{Entities, Redone, RenderOrigin};
 use crate::scene::color::luminance;
-use crate::scene::{GlobalTransform, Hidden, Light, Material, TriangleMesh, Visible};
+use crate::scene::{GlobalTransform, Hidden, Light, Material, TriangleMesh, Visible, rotation};
 use crate::trace::light::FlatLight;
 use crate::trace::mesh_light::{MeshLight, triangle_area};
 use crate::trace::quad::Quad;
 use crate::trace::scene::InstanceData;
 use crate::trace::shape_light::{Shape, ShapeLight};
+use crate::trace::sky::SkyLight;
 use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, Vec3};
@@ -37,7 +38,7 @@ pub fn sync_lights(
     entities.lights.clear();
     let mut flat: Vec<FlatLight> = Vec::new();
     for (entity, light, global, visible) in placed {
-        if let Some(light) = flatten(light, &origin.render_from(global), visible) {
+        if let Some(light) = flatten(light, &origin.render_from(global), visible, &lights) {
             entities.lights.push(entity);
             flat.push(light);
         }
@@ -57,7 +58,12 @@ pub fn sync_lights(
 }
 
 /// The light in render space; `None` if it emits nothing, has no place, or its placement left it no extent.
-fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Option<FlatLight> {
+fn flatten(
+    light: &Light,
+    placed: &DAffine3,
+    visible: Option<&Visible>,
+    before: &Lights,
+) -> Option<FlatLight> {
     if !placed.is_finite() {
         return None;
     }
@@ -125,6 +131,14 @@ fn flatten(light: &Light, placed: &DAffine3, visible: Option<&Visible>) -> Optio
         Light::Sphere { radius, radiance } => {
             let scale = Vec3::AXES.map(|a| vector(a).length()).iter().sum::<f32>() / 3.0;
             solid(Shape::Sphere { center: position, radius: radius * scale }, [radiance; 4], true)
+        }
+        Light::Sky { ref sky, scale } => {
+            let turned = rotation(placed.matrix3).as_mat3();
+            let old = (0..before.len() as u32).find_map(|i| match before.get(i) {
+                FlatLight::Sky(old) => Some(old),
+                _ => None,
+            });
+            SkyLight::new(sky, scale, turned, old).map(FlatLight::Sky)
         }
         Light::Environment { radiance } => {
             (radiance != Vec3::ZERO).then_some(FlatLight::Environment { radiance })

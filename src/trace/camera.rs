@@ -7,7 +7,7 @@ use crate::bvh::Ray;
 use crate::bvh::simd::{Job, Simd};
 use crate::scene::{Lens, Projection};
 use bevy_ecs::prelude::*;
-use glam::{DAffine3, DMat3, DVec3, UVec2, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Mat3, UVec2, Vec2, Vec3};
 
 /// The camera as rays need it, in render space.
 #[derive(Resource, Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,47 @@ pub struct Viewpoint {
     perspective: bool,
     /// `None`: a pinhole, all is sharp.
     lens: Option<Lens>,
+}
+
+/// A view as linear functions of the place in its picture, in pixels from the top left.
+#[derive(Clone, Copy, Debug)]
+pub struct Sheet {
+    /// Of the origin of the ray there: its value at (0, 0), and what each pixel across and down adds.
+    pub origin: [Vec3; 3],
+    /// The same of its direction, which is of depth 1.
+    pub direction: [Vec3; 3],
+    /// Origin of the camera's own space, ...
+    pub eye: Vec3,
+    /// ... and its axes as rows: picture right, picture up, ahead.
+    pub axes: Mat3,
+    middle: Vec2,
+    scale: f32,
+    /// Whether what is farther away looks smaller.
+    pub perspective: bool,
+}
+
+impl Sheet {
+    /// Where a point of the camera's own space is in the picture.
+    #[inline(always)]
+    #[must_use]
+    pub fn place(&self, point: Vec3) -> Vec2 {
+        let scale = if self.perspective { self.scale / point.z } else { self.scale };
+        self.middle + Vec2::new(point.x, -point.y) * scale
+    }
+
+    /// A point of render space in the camera's own.
+    #[inline(always)]
+    #[must_use]
+    pub fn own(&self, point: Vec3) -> Vec3 {
+        self.axes * (point - self.eye)
+    }
+
+    /// How much of the scene a pixel shows at `depth`, scene units.
+    #[inline(always)]
+    #[must_use]
+    pub fn pixel(&self, depth: f32) -> f32 {
+        if self.perspective { depth / self.scale } else { 1.0 / self.scale }
+    }
 }
 
 impl Default for Viewpoint {
@@ -123,6 +164,30 @@ impl Viewpoint {
         Vec3::new(0.5 * size.x + x, 0.5 * size.y - y, depth)
     }
 
+    /// All rays through a picture of `size` at once, and how to find a point of another view in this one.
+    #[must_use]
+    pub fn sheet(&self, size: UVec2) -> Sheet {
+        let size = size.as_vec2();
+        let across = self.right * (2.0 * self.half_height / size.y);
+        let down = self.up * (-2.0 * self.half_height / size.y);
+        let corner = (self.up - self.right * (size.x / size.y)) * self.half_height;
+        let (still, ahead) = ([self.origin, Vec3::ZERO, Vec3::ZERO], -self.back);
+        let (origin, direction) = if self.perspective {
+            (still, [corner + ahead, across, down])
+        } else {
+            ([self.origin + corner, across, down], [ahead, Vec3::ZERO, Vec3::ZERO])
+        };
+        Sheet {
+            origin,
+            direction,
+            eye: self.origin,
+            axes: Mat3::from_cols(self.right, self.up, ahead).transpose(),
+            middle: size * 0.5,
+            scale: 0.5 * size.y / self.half_height,
+            perspective: self.perspective,
+        }
+    }
+
     /// How deep a point of `ray` at `t` is, as [`Viewpoint::project`] measures it.
     #[must_use]
     pub fn depth(&self, ray: &Ray, t: f32) -> f32 {
@@ -191,6 +256,26 @@ mod tests {
                 let ray = viewpoint.ray(Vec2::new(x, y), size);
                 let there = viewpoint.project(ray.at(t), size);
                 assert!(there.abs_diff_eq(Vec3::new(x, y, viewpoint.depth(&ray, t)), 2e-3), "{there}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sheet_is_all_rays_and_projections() {
+        let size = UVec2::new(640, 360);
+        for viewpoint in BOTH.map(viewpoint) {
+            let sheet = viewpoint.sheet(size);
+            for (x, y) in [(0.0, 0.0), (320.0, 180.0), (639.5, 12.25)] {
+                let at = |[a, b, c]: [Vec3; 3]| a + b * x + c * y;
+                let ray = viewpoint.ray(Vec2::new(x, y), size);
+                assert!(at(sheet.origin).abs_diff_eq(ray.origin, 1e-5));
+                assert!(at(sheet.direction).normalize().abs_diff_eq(ray.direction, 1e-5));
+                let point = at(sheet.origin) + at(sheet.direction) * 2.5;
+                let own = sheet.own(point);
+                assert!((own.z - 2.5).abs() < 1e-5);
+                assert!(sheet.place(own).abs_diff_eq(Vec2::new(x, y), 2e-3));
+                let next = viewpoint.project(point + viewpoint.right * sheet.pixel(own.z), size);
+                assert!((next.x - x - 1.0).abs() < 2e-3, "a pixel to the right");
             }
         }
     }

@@ -259,6 +259,6 @@ pub fn name_of(light: &FlatLight) -> &'static str {
             Shape::Sphere { .. } => "sphere",
         },
         FlatLight::Mesh(_) => "mesh",
-        FlatLight::Environment { .. } => "sky",
+        FlatLight::Environment { .. } | FlatLight::Sky(_) => "sky",
     }
 }

@@ -164,6 +164,8 @@ pub struct Tile {
     pub(super) complete: u32,
     /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
     pub dropped: u64,
+    /// It gets no samples for now.
+    rests: bool,
     /// What the pixels hold is from before the last reset.
     stale: bool,
     /// What is known of its part of the scene until the next reset.
@@ -172,6 +174,12 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Whether it gets no samples for now: see [`Film::confine`].
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.rests
+    }
+
     /// What [`Tile::more`] is to be of a pixel when it has its share of `beyond` samples.
     #[must_use]
     pub(super) fn goal(&self, pixel: usize, beyond: u32) -> u32 {
@@ -208,6 +216,8 @@ pub struct Film {
     first_sample: u32,
     /// Samples of each pixel from which on [`Film::allot`] gives out shares; 0 if it does not.
     even_samples: u32,
+    /// See [`Film::confine`].
+    region: Option<[UVec2; 2]>,
     tiles: Vec<Tile>,
 }
 
@@ -230,13 +240,14 @@ impl Film {
                     shares: Vec::new(),
                     complete: 0,
                     dropped: 0,
+                    rests: false,
                     stale: false,
                     sightlines: Sightlines::default(),
                     pixels,
                 }
             })
             .collect();
-        Self { size, first_sample, even_samples: 0, tiles }
+        Self { size, first_sample, even_samples: 0, region: None, tiles }
     }
 
     /// Forgets all samples, in no time: a tile is cleared when it is next worked on.
@@ -274,6 +285,32 @@ impl Film {
             tile.next_sample = (tile.next_sample - self.first_sample) + first_sample;
         }
         self.first_sample = first_sample;
+    }
+
+    /// From now on only tiles that touch the rectangle from `min` to `max` (pixels; its end is outside) get samples
+    /// and are counted, until this is called again; `None`: all.
+    pub fn confine(&mut self, region: Option<[UVec2; 2]>) {
+        self.region = region;
+        for tile in &mut self.tiles {
+            tile.rests = region.is_some_and(|[min, max]| {
+                let end = tile.origin + tile.size;
+                !(tile.origin.cmplt(max).all() && end.cmpgt(min).all())
+            });
+        }
+        // A film of which nothing is worked on would be complete.
+        if self.tiles.iter().all(|tile| tile.rests) {
+            self.tiles.iter_mut().for_each(|tile| tile.rests = false);
+        }
+    }
+
+    /// What it was confined to.
+    #[must_use]
+    pub fn region(&self) -> Option<[UVec2; 2]> {
+        self.region
+    }
+
+    fn working(&self) -> impl Iterator<Item = &Tile> {
+        self.tiles.iter().filter(|tile| !tile.rests)
     }
 
     /// Index of the first sample that each pixel gets.
@@ -353,9 +390,9 @@ impl Film {
     #[must_use]
     pub fn complete_samples(&self) -> u32 {
         if self.is_allotted() {
-            return self.tiles.iter().map(|t| t.complete).min().unwrap_or(0);
+            return self.working().map(|t| t.complete).min().unwrap_or(0);
         }
-        self.tiles.iter().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample
+        self.working().map(|t| t.next_sample).min().unwrap_or(0) - self.first_sample
     }
 
     /// Samples a pixel has on average.
@@ -365,7 +402,8 @@ impl Film {
             let even = u64::from(t.next_sample - self.first_sample) * u64::from(t.size.element_product());
             even + t.more.iter().map(|&n| u64::from(n)).sum::<u64>()
         };
-        self.tiles.iter().map(of).sum::<u64>() as f64 / f64::from(self.size.element_product())
+        let pixels: u64 = self.working().map(|t| u64::from(t.size.element_product())).sum();
+        self.working().map(of).sum::<u64>() as f64 / pixels as f64
     }
 
     /// Samples dropped because they were not finite.
@@ -387,6 +425,22 @@ mod tests {
         let tile = &film.tiles()[0];
         assert_eq!(tile.goal(0, 3), 6);
         assert_eq!(tile.goal(0, u32::MAX), 6);
+    }
+
+    #[test]
+    fn tiles_beside_the_region_rest_and_do_not_count() {
+        let mut film = Film::new(UVec2::new(32, 24), 0);
+        film.confine(Some([UVec2::new(8, 8), UVec2::new(17, 9)]));
+        let working: Vec<UVec2> = film.working().map(|tile| tile.origin).collect();
+        assert_eq!(working, [UVec2::new(8, 8), UVec2::new(16, 8)]);
+        for tile in film.tiles_mut().iter_mut().filter(|tile| !tile.rests()) {
+            tile.next_sample += 5;
+        }
+        assert_eq!((film.complete_samples(), film.mean_samples()), (5, 5.0));
+        film.confine(None);
+        assert_eq!(film.complete_samples(), 0);
+        film.confine(Some([UVec2::splat(100), UVec2::splat(200)]));
+        assert_eq!(film.working().count(), 12, "nothing of the film is all of it");
     }
 
     #[test]

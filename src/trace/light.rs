@@ -5,6 +5,7 @@
 
 use super::mesh_light::MeshLight;
 use super::shape_light::ShapeLight;
+use super::sky::SkyLight;
 use super::warp::{cone, cone_pdf, cosine_hemisphere, offset};
 use crate::scene::Emission;
 use crate::scene::color::luminance;
@@ -58,6 +59,8 @@ pub enum FlatLight {
     Shape(ShapeLight),
     /// Triangles of an emissive instance.
     Mesh(MeshLight),
+    /// Everywhere beyond the scene, another in each direction.
+    Sky(SkyLight),
     /// Everywhere beyond the scene.
     Environment {
         /// Radiance, W/(m² sr).
@@ -127,6 +130,7 @@ impl FlatLight {
             }
             Self::Shape(light) => light.sample(point, normal, u),
             Self::Mesh(light) => light.sample(point, u),
+            Self::Sky(light) => light.sample(u),
             Self::Environment { radiance } => {
                 let local = cosine_hemisphere(u);
                 let (tangent, bitangent) = normal.any_orthonormal_pair();
@@ -140,6 +144,7 @@ impl FlatLight {
     #[must_use]
     pub fn beyond(&self, normal: Vec3, wi: Vec3) -> Option<(Vec3, f32)> {
         match self {
+            Self::Sky(light) => Some(light.toward(wi)),
             Self::Environment { radiance } => Some((*radiance, normal.dot(wi).max(0.0) / PI)),
             Self::Directional { axis, irradiance, sin2_radius } if *sin2_radius > 0.0 => {
                 let inside = axis.cross(wi).length_squared() <= *sin2_radius && axis.dot(wi) < 0.0;
@@ -165,6 +170,7 @@ impl FlatLight {
                 PI * light.shape.area() * luminance(mean)
             }
             Self::Mesh(light) => light.power,
+            Self::Sky(light) => PI * disc * light.mean_luminance(),
             Self::Environment { radiance } => PI * disc * luminance(*radiance),
         }
     }

@@ -81,7 +81,7 @@ impl Lights {
         let shape_lights = solid.iter().map(|(i, _)| *i).collect();
         let beyond = numbered()
             .filter(|(l, _)| match l {
-                FlatLight::Environment { .. } => true,
+                FlatLight::Environment { .. } | FlatLight::Sky(_) => true,
                 FlatLight::Directional { sin2_radius, .. } => *sin2_radius > 0.0,
                 _ => false,
             })

@@ -73,6 +73,7 @@ pub fn trace_pass(
     let beyond = samples.saturating_sub(film.even_samples());
     film.tiles_mut()
         .par_iter_mut()
+        .filter(|tile| !tile.rests())
         .map_init(Batch::default, |batch, tile| {
             let mut rays = RayCounts::default();
             loop {

@@ -50,6 +50,15 @@ pub enum Shape {
 }
 
 impl ShapeLight {
+    /// Unit normal at a point of it.
+    #[must_use]
+    pub fn normal_at(&self, point: Vec3) -> Vec3 {
+        match self.shape {
+            Shape::Sphere { center, .. } => (point - center).normalize_or(Vec3::Z),
+            _ => self.normal,
+        }
+    }
+
     /// See the fields.
     #[must_use]
     pub fn new(shape: Shape, radiance: [Vec3; 4], two_sided: bool, visible: bool) -> Self {

@@ -35,6 +35,12 @@ pub struct Interaction {
     pub lifted: Option<Vec3>,
 }
 
+/// The point of the triangle with these corners that `hit` is at.
+fn barycentric(corners: &[DVec3; 3], hit: &Hit) -> DVec3 {
+    let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+    corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v
+}
+
 /// 2⁻²⁴, the rounding unit of f32.
 pub(super) const UNIT: f64 = 1.0 / (1 << 24) as f64;
 
@@ -43,14 +49,41 @@ impl Interaction {
     #[must_use]
     pub fn new(scene: &TraceScene, instance: &InstanceData, hit: &Hit, ray: &Ray) -> Self {
         let mesh = &*instance.mesh;
+        let mut at = Self::flat(scene, instance, hit, ray);
+        if !mesh.normals.is_empty() && at.normal.dot(at.wo) > 0.0 {
+            let world_from_local = scene.geometry.tlas.placements()[hit.instance as usize].world_from_local();
+            let corners = mesh.corners(hit.triangle as usize).map(Vec3::as_dvec3);
+            let indices = mesh.triangles[hit.triangle as usize];
+            let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+            let local = barycentric(&corners, hit);
+            let position = if scene.geometry.tlas.placements()[hit.instance as usize].is_identity() {
+                local
+            } else {
+                world_from_local.transform_point3(local)
+            };
+            let side = if at.front { 1.0 } else { -1.0 };
+            let smooth = [0, 1, 2].map(|i| {
+                let normal = mesh.normals.get(indices[i] as usize).map_or(DVec3::ZERO, |n| n.as_dvec3());
+                let away = position - world_from_local.transform_point3(corners[i]);
+                let normal = (instance.normal_matrix * normal).normalize_or_zero() * side;
+                (weights[i], away.as_vec3(), normal.as_vec3())
+            });
+            at.lifted = at.lift(scene, &smooth);
+        }
+        at
+    }
+
+    /// [`Interaction::new`] for who needs no light there: without `lifted`, which may cost a ray.
+    #[must_use]
+    pub fn flat(scene: &TraceScene, instance: &InstanceData, hit: &Hit, ray: &Ray) -> Self {
+        let mesh = &*instance.mesh;
         let placement = &scene.geometry.tlas.placements()[hit.instance as usize];
         let corners = mesh.corners(hit.triangle as usize).map(Vec3::as_dvec3);
         let indices = mesh.triangles[hit.triangle as usize];
         let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
 
         // In double precision the point lies in the plane whatever the rounding of u and v.
-        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        let local = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
+        let local = barycentric(&corners, hit);
         let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(DVec3::Z);
         // Most things are where their mesh is.
         let (position, spread, facet) = if placement.is_identity() {
@@ -83,7 +116,7 @@ impl Interaction {
                 .try_normalize()
                 .map_or(Vec4::ZERO, |t| (t.as_vec3() * side).extend(w * side))
         });
-        let mut at = Self {
+        Self {
             position: position.as_vec3(),
             error: error.as_vec3(),
             geometric_normal,
@@ -94,18 +127,7 @@ impl Interaction {
             color: interpolate(&mesh.colors, indices, weights).unwrap_or(Vec4::ONE),
             front,
             lifted: None,
-        };
-        if !mesh.normals.is_empty() && at.normal.dot(at.wo) > 0.0 {
-            let world_from_local = placement.world_from_local();
-            let smooth = [0, 1, 2].map(|i| {
-                let normal = mesh.normals.get(indices[i] as usize).map_or(DVec3::ZERO, |n| n.as_dvec3());
-                let away = position - world_from_local.transform_point3(corners[i]);
-                let normal = (instance.normal_matrix * normal).normalize_or_zero() * f64::from(side);
-                (weights[i], away.as_vec3(), normal.as_vec3())
-            });
-            at.lifted = at.lift(scene, &smooth);
         }
-        at
     }
 
     /// The point on the smooth surface: facets of a coarse mesh would shadow each other where its normals still

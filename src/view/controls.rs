@@ -2,11 +2,12 @@
 
 use super::flags::camera_flags;
 use super::input::Input;
-use super::keymap::Tap;
+use super::keymap::{Hold, Tap};
 use crate::image::develop::exposure_for;
 use crate::image::{Display, ToneMap, save};
 use crate::open::SceneOrigin;
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
+use crate::shown::Shown;
 use crate::trace::{Film, Integrator, RenderSettings};
 use bevy_ecs::prelude::*;
 use std::path::PathBuf;
@@ -95,6 +96,33 @@ pub fn change_display(
 /// `exposure` moved by `thirds` of a stop, on the grid of thirds: three steps are one stop exactly.
 fn step_exposure(exposure: f32, thirds: f32) -> f32 {
     ((exposure * 3.0).round() + thirds).clamp(-90.0, 90.0) / 3.0
+}
+
+/// Whether old samples are kept while moving, and whether the first second is smoothed.
+pub fn change_shown(
+    input: Res<Input>,
+    mut shown: ResMut<Shown>,
+    mut display: ResMut<Display>,
+    mut notices: ResMut<Notices>,
+) {
+    let compares = input.is_held(Hold::Compare);
+    if shown.hold_smoothing != compares {
+        shown.hold_smoothing = compares;
+    }
+    let mut said = Vec::new();
+    if input.count(Tap::KeepSamples) % 2 == 1 {
+        shown.only_film = !shown.only_film;
+        said.push(if shown.only_film { "old samples: left alone" } else { "old samples: kept while moving" });
+    }
+    if input.count(Tap::Smooth) % 2 == 1 {
+        shown.never_smooth = !shown.never_smooth;
+        said.push(if shown.never_smooth { "not smoothed" } else { "smoothed in the first second" });
+    }
+    if !said.is_empty() {
+        // To be developed again.
+        display.set_changed();
+    }
+    notices.0.extend(said.into_iter().map(|text| Notice::Text(text.to_owned())));
 }
 
 /// Saves the film, linear and as it is shown.

@@ -6,15 +6,16 @@ use super::debug::layer::Layer;
 use super::input::{Command, Input};
 use super::instrument::{Instrument, Reference};
 use super::keymap::Tap;
+use super::plain::Plain;
 use super::prepare::{prepare, status};
-use super::reload::{load_again, open_other};
+use super::reload::{is_sky, load_again, open_other, set_sky};
 use super::status::Status;
 use super::watch::{PAUSE, SceneWatch};
 use crate::app::{App, FrameBudget, FrameStats};
 use crate::image::compare::LinearImage;
 use crate::image::develop::develop_image;
 use crate::image::{Display, Picture};
-use crate::load::SceneSource;
+use crate::load::{SceneSource, Watcher};
 use crate::open::SceneOrigin;
 use crate::sync::Redone;
 use bevy_ecs::prelude::*;
@@ -45,6 +46,8 @@ pub enum Wake {
     OpenFailed(String),
     /// The engine's thread panicked.
     Crashed(String),
+    /// The picture of the film alone that this key asked for.
+    Plain(Tap, Picture),
     /// Something to show to the user.
     Notice(String),
     /// Something to show, and to be pasted elsewhere.
@@ -64,6 +67,8 @@ pub struct Published {
     pub spare: Picture,
     /// What is drawn over the picture.
     pub layer: Option<Arc<Layer>>,
+    /// What is loading, and how far it is.
+    pub loading: Option<String>,
     /// For the status lines. `None` until the scene is open.
     pub status: Option<Status>,
     /// Whether the view is changing, so that pictures are to be shown at once.
@@ -74,6 +79,8 @@ pub struct Published {
 
 /// The engine's ends of what connects it with the window.
 pub struct Engine<W> {
+    /// What it opens first.
+    pub scene: String,
     /// A picture to measure the true error by.
     pub reference: Option<LinearImage>,
     /// From the window.
@@ -93,11 +100,11 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl<W: Fn(Wake)> Engine<W> {
+impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
     /// Opens the app and runs frames until told to quit.
-    pub fn run(mut self, open: impl FnOnce() -> Result<App, String>) {
+    pub fn run(mut self, open: impl FnOnce(Watcher) -> Result<App, String>) {
         // A bug in a frame must end in a message, not in a window that never changes again.
-        let outcome = catch_unwind(AssertUnwindSafe(|| match open() {
+        let outcome = catch_unwind(AssertUnwindSafe(|| match open(self.watcher(&self.scene)) {
             Ok(mut app) => {
                 let reference = self.reference.take();
                 if let Some(image) = &reference {
@@ -114,7 +121,23 @@ impl<W: Fn(Wake)> Engine<W> {
         }
     }
 
+    /// Shows how far loading is.
+    fn watcher(&self, name: &str) -> Watcher {
+        let (published, wake, name) = (Arc::clone(&self.published), self.wake.clone(), name.to_owned());
+        Watcher(Some(Arc::new(move |phase, part| {
+            let text = format!("loading {name}: {phase} {:.0} %", f64::from((part * 20.0).round() * 5.0));
+            let mut published = lock(&published);
+            // Not for each triangle.
+            if published.loading.as_deref() != Some(&text) {
+                published.loading = Some(text);
+                drop(published);
+                wake(Wake::FrameReady);
+            }
+        })))
+    }
+
     fn run_frames(&self, mut app: App) {
+        lock(&self.published).loading = None;
         prepare(&mut app, &self.interrupt);
         let mut files = self.watch(&app);
         let mut view_changed_at = Instant::now();
@@ -191,10 +214,15 @@ impl<W: Fn(Wake)> Engine<W> {
     fn replaced(&self, app: &mut App, path: Option<PathBuf>) -> Option<App> {
         let start = Instant::now();
         let again = path.is_none();
+        let name =
+            path.as_ref().map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned());
+        let watcher = self.watcher(name.as_deref().unwrap_or("the scene again"));
         let loaded = match path {
-            Some(path) => open_other(app, &path),
-            None => load_again(app),
+            Some(path) if is_sky(&path) => set_sky(app, path, watcher),
+            Some(path) => open_other(app, &path, watcher),
+            None => load_again(app, watcher),
         };
+        lock(&self.published).loading = None;
         match loaded {
             Ok(other) => {
                 let name =
@@ -262,6 +290,9 @@ impl<W: Fn(Wake)> Engine<W> {
 
     /// Passes the frame's notices on.
     fn say(&self, app: &mut App) {
+        for (tap, picture) in std::mem::take(&mut app.world.resource_mut::<Plain>().0) {
+            (self.wake)(Wake::Plain(tap, picture));
+        }
         for notice in std::mem::take(&mut app.world.resource_mut::<Notices>().0) {
             (self.wake)(match notice {
                 Notice::Text(text) => Wake::Notice(text),

@@ -51,6 +51,8 @@ pub enum Command {
         /// When the event arrived.
         at: Instant,
     },
+    /// Refine only what is between these places, from the upper left corner at 0 to the lower right one at 1.
+    Region([DVec2; 2]),
     /// Show this scene instead.
     Open(PathBuf),
     /// A file of the scene may have changed.
@@ -70,6 +72,8 @@ pub enum Drag {
     Orbit,
     /// Move sideways, so that the pivot stays under the cursor.
     Pan,
+    /// Draw the rectangle that is to be refined.
+    Region,
 }
 
 /// A key press.
@@ -142,7 +146,7 @@ pub struct Input {
     seconds: [f64; Hold::COUNT],
     since: Instant,
     /// Mouse motion to the right and down, pixels, by [`Drag`].
-    pub dragged: [DVec2; 3],
+    pub dragged: [DVec2; 4],
     /// Wheel notches, for the speed.
     pub wheel: f64,
     /// Wheel notches, toward the pivot.
@@ -151,6 +155,8 @@ pub struct Input {
     pub taps: Vec<Press>,
     /// New values for the selected thing.
     pub edits: Vec<(Property, f64)>,
+    /// Two corners of what alone is to be refined.
+    pub region: Option<[DVec2; 2]>,
     /// New size of the picture.
     pub resize: Option<UVec2>,
 }
@@ -163,11 +169,12 @@ impl Input {
             held: [false; Hold::COUNT],
             seconds: [0.0; Hold::COUNT],
             since: now,
-            dragged: [DVec2::ZERO; 3],
+            dragged: [DVec2::ZERO; 4],
             wheel: 0.0,
             dolly: 0.0,
             taps: Vec::new(),
             edits: Vec::new(),
+            region: None,
             resize: None,
         }
     }
@@ -201,6 +208,10 @@ impl Input {
                 self.resize = Some(size);
                 None
             }
+            Command::Region(corners) => {
+                self.region = Some(corners);
+                None
+            }
             Command::Open(_) | Command::FilesChanged | Command::Quit => None,
         }
     }
@@ -220,11 +231,12 @@ impl Input {
     /// Forgets what has been done with; what is held stays held.
     pub fn end_frame(&mut self) {
         self.seconds = [0.0; Hold::COUNT];
-        self.dragged = [DVec2::ZERO; 3];
+        self.dragged = [DVec2::ZERO; 4];
         self.wheel = 0.0;
         self.dolly = 0.0;
         self.taps.clear();
         self.edits.clear();
+        self.region = None;
         self.resize = None;
     }
 

@@ -3,6 +3,7 @@
 use super::input::{Command, Press};
 use super::keymap::{Action, Hold, Tap, is_modifier};
 use super::replay::Event;
+use super::ui::open::{Prompt, Typed};
 use super::window::Viewer;
 use std::time::Instant;
 use winit::event::{ElementState, KeyEvent};
@@ -15,6 +16,17 @@ impl Viewer {
             return;
         };
         let pressed = event.state == ElementState::Pressed;
+        if pressed && let Some(prompt) = &mut self.ui.prompt {
+            match prompt.key(code, event.text.as_deref()) {
+                Typed::On => {}
+                Typed::Nothing => self.ui.prompt = None,
+                Typed::Open(path) => {
+                    self.ui.prompt = None;
+                    self.send(Command::Open(path));
+                }
+            }
+            return self.redraw();
+        }
         if pressed && self.ui.takes_text() {
             self.ui.key(code, event.text.as_deref());
             return self.redraw();
@@ -80,16 +92,24 @@ impl Viewer {
             Tap::HudLevel => self.ui.level = self.ui.level.next(),
             Tap::Graph => self.ui.graph = !self.ui.graph,
             Tap::Help => self.ui.help = !self.ui.help,
+            Tap::Report => self.ui.report = !self.ui.report,
+            Tap::Open => self.ui.prompt = Some(Prompt::new("")),
             Tap::Escape if self.ui.help => self.ui.help = false,
+            Tap::Escape if self.ui.report => self.ui.report = false,
             Tap::Quit => event_loop.exit(),
-            Tap::Keep => self.keep_picture(),
+            // What is looked at closely is the film alone: the engine is asked for it.
+            Tap::Keep | Tap::Screenshot | Tap::ScreenshotWithHud if self.is_altered() => {
+                let press = Press { tap, shift: false, cursor: self.cursor_in_picture() };
+                return self.send(Command::Tap { press, at: Instant::now() });
+            }
+            Tap::Keep => self.keep_picture(self.picture.clone()),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {
                     screen.toggle_full_screen();
                 }
             }
             Tap::Screenshot | Tap::ScreenshotWithHud => {
-                self.save_screenshot(tap == Tap::ScreenshotWithHud);
+                self.save_screenshot(tap == Tap::ScreenshotWithHud, None);
             }
             tap => {
                 let shift = self.held[Hold::Fast as usize];

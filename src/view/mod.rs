@@ -8,6 +8,7 @@
 pub mod cameras;
 pub mod chord;
 pub mod controls;
+pub mod crop;
 pub mod debug;
 pub mod edit;
 pub mod engine;
@@ -20,6 +21,7 @@ mod keys;
 pub mod keys_file;
 pub mod orbit;
 pub mod pixel_view;
+pub mod plain;
 mod pointer;
 mod prepare;
 mod present;
@@ -35,6 +37,7 @@ pub mod window;
 
 use crate::app::App;
 use crate::image::compare::LinearImage;
+use crate::load::Watcher;
 use engine::Wake;
 use glam::UVec2;
 use std::time::Duration;
@@ -116,7 +119,7 @@ pub enum ViewError {
 
 /// Opens the window and returns when it is closed.
 ///
-/// `open` makes the app. It runs on the engine's thread once the window is there, so a scene that
+/// `open` makes the app, and says how far it is. It runs on the engine's thread once the window is there, so a scene that
 /// loads for a minute is a window that says so for a minute. Call this on the main thread, once.
 ///
 /// # Errors
@@ -126,7 +129,7 @@ pub enum ViewError {
 /// - [`ViewError::Lost`] if the window or the engine breaks down later.
 pub fn run(
     options: ViewOptions,
-    open: impl FnOnce() -> Result<App, String> + Send + 'static,
+    open: impl FnOnce(Watcher) -> Result<App, String> + Send + 'static,
 ) -> Result<Response, ViewError> {
     let event_loop = event_loop().map_err(ViewError::NoDisplay)?;
     let mut viewer = window::Viewer::new(options, event_loop.create_proxy(), Box::new(open));

@@ -25,6 +25,8 @@ impl Viewer {
         }
         let drag = match button {
             MouseButton::Right => Drag::Look,
+            // While a rectangle is drawn, letting the key go first changes nothing.
+            MouseButton::Left if self.held[Hold::Control as usize] || self.draws_region() => Drag::Region,
             MouseButton::Left => Drag::Orbit,
             MouseButton::Middle => Drag::Pan,
             _ => return,
@@ -34,7 +36,12 @@ impl Viewer {
         } else if let Some((current, start)) = self.drag
             && current == drag
         {
+            let drawn = self.drawn_region();
             self.end_drag();
+            if let Some(corners) = drawn {
+                self.send(Command::Region(corners));
+                return self.redraw();
+            }
             let way = DVec2::new(self.cursor.x - start.x, self.cursor.y - start.y);
             if drag == Drag::Orbit && !self.dragged && way.length() < CLICK {
                 let shift = self.held[Hold::Fast as usize];
@@ -42,6 +49,17 @@ impl Viewer {
                 self.send(Command::Tap { press, at: Instant::now() });
             }
         }
+    }
+
+    fn draws_region(&self) -> bool {
+        matches!(self.drag, Some((Drag::Region, _)))
+    }
+
+    /// The corners of the rectangle that is being drawn, in parts of the picture.
+    pub(super) fn drawn_region(&self) -> Option<[DVec2; 2]> {
+        let (Some((Drag::Region, start)), Some(screen)) = (self.drag, &self.screen) else { return None };
+        let part = |at: PhysicalPosition<f64>| DVec2::new(at.x, at.y) / screen.size().as_dvec2();
+        Some([part(start), part(self.cursor)])
     }
 
     fn begin_drag(&mut self, drag: Drag) {
@@ -82,6 +100,9 @@ impl Viewer {
         if drag != Drag::Look {
             // The pointer is free: what counts is how far it came in the window.
             let pixels = DVec2::new(to.x - from.x, to.y - from.y);
+            if drag == Drag::Region {
+                return self.redraw();
+            }
             // A hand that clicks shakes.
             if drag == Drag::Orbit && !self.dragged {
                 self.dragged = DVec2::new(to.x - start.x, to.y - start.y).length() >= CLICK;

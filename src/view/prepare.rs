@@ -4,8 +4,9 @@ use super::cameras::{
     Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
 };
 use super::controls::{
-    Notices, Paused, change_display, change_pause, change_settings, print_camera, save_picture,
+    Notices, Paused, change_display, change_pause, change_settings, change_shown, print_camera, save_picture,
 };
+use super::crop::change_region;
 use super::debug::{CurrentLayer, Debug, DebugLines, change_debug, draw_layer, explain_pinned};
 use super::edit::{Editor, edit_scene, finish_sync, start_sync};
 use super::engine::Pending;
@@ -17,16 +18,21 @@ use super::pixel_view::{
     CurrentLegend, DepthWanted, FirstHits, PixelView, choose_pixel_view, develop_pixel_view,
     refine_first_hits,
 };
+use super::plain::{Plain, develop_plain};
 use super::recipe::recipe;
-use super::status::Status;
+use super::status::{Machine, Status};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
 use crate::image::Display;
+use crate::open::LoadCard;
 use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
+use crate::shown::Shown;
 use crate::sync::{Redone, build_blas, reset_film};
-use crate::trace::{Geometry, RenderSettings};
+use crate::trace::film::Pixel;
+use crate::trace::{Film, Geometry, Lights, RenderSettings};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
 use glam::DVec3;
+use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -53,6 +59,8 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     }
     app.world.init_resource::<Paused>();
     app.world.init_resource::<Notices>();
+    app.world.init_resource::<Plain>();
+    app.world.init_resource::<Held>();
     app.world.init_resource::<Bookmarks>();
     app.world.init_resource::<Pending>();
     app.world.init_resource::<PixelView>();
@@ -74,7 +82,9 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     }
     app.add_systems(
         (
+            change_region,
             change_settings,
+            (change_shown, develop_plain).chain(),
             save_picture,
             change_display,
             change_pause,
@@ -88,6 +98,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
     app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
     app.add_systems(finish_sync.in_set(FrameSystems::Sync).after(reset_film));
+    app.add_systems(count_held.in_set(FrameSystems::Trace));
     app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
 }
@@ -99,6 +110,8 @@ pub fn status(app: &App) -> Status {
     let stats = world.resource::<FrameStats>();
     let settings = world.resource::<RenderSettings>();
     let display = world.resource::<Display>();
+    let shown = world.resource::<Shown>();
+    let shows_light = *world.resource::<PixelView>() == PixelView::Beauty;
     Status {
         samples_per_pixel: stats.samples_per_pixel,
         sample_target: world.resource::<FrameBudget>().sample_target,
@@ -112,6 +125,14 @@ pub fn status(app: &App) -> Status {
         recipe: recipe(world),
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
+        kept: shown.kept_share(world.resource::<Film>().complete_samples(), stats.done),
+        smoothed: shown.is_smoothed() && shows_light,
+        region: world.resource::<FrameBudget>().region.map(|[min, max]| {
+            let size = max - min;
+            [min.x, min.y, size.x, size.y]
+        }),
+        card: world.get_resource::<LoadCard>().map_or_else(|| Arc::from(""), |card| Arc::clone(&card.0)),
+        machine: machine(world),
         resets: world.resource::<Redone>().resets,
         dropped: stats.dropped,
         exposure: display.exposure,
@@ -122,5 +143,43 @@ pub fn status(app: &App) -> Status {
         integrator: settings.integrator,
         filter: settings.filter,
         isa: world.resource::<Geometry>().tlas.isa().name(),
+    }
+}
+
+/// What the hierarchy holds, counted when it changes.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+struct Held {
+    triangles: usize,
+    bytes: usize,
+}
+
+fn count_held(geometry: Res<Geometry>, mut held: ResMut<Held>) {
+    if !geometry.is_changed() {
+        return;
+    }
+    let mut meshes = HashSet::new();
+    *held = Held::default();
+    for (data, placement) in geometry.instances.iter().zip(geometry.tlas.placements()) {
+        held.triangles += data.mesh.triangles.len();
+        if meshes.insert(Arc::as_ptr(placement.blas())) {
+            held.bytes += placement.blas().bytes();
+        }
+    }
+}
+
+fn machine(world: &World) -> Machine {
+    let shown = world.resource::<Shown>();
+    let held = world.resource::<Held>();
+    let pixels = world.resource::<Film>().size().element_product() as usize;
+    Machine {
+        threads: rayon::current_num_threads(),
+        counts: [
+            world.resource::<Geometry>().instances.len(),
+            held.triangles,
+            world.resource::<Lights>().len(),
+        ],
+        bytes: [pixels * size_of::<Pixel>(), shown.bytes(), held.bytes],
+        first_picture: [world.resource::<FrameStats>().preview_seconds, shown.seconds[0]],
+        developing: shown.seconds[1],
     }
 }

@@ -1,14 +1,17 @@
 //! Pictures onto the screen, and what that tells: pictures a second, latency, the title.
 
 use super::ViewError;
+use super::crop;
 use super::engine::{Wake, lock};
 use super::input::Command;
-use super::keymap::Hold;
-use super::screen::Presented;
+use super::keymap::{Hold, Tap};
+use super::screen::{Presented, Screen};
 use super::screenshot;
-use super::status::Measured;
+use super::status::{Level, Measured, Status};
 use super::ui::Content;
 use super::window::Viewer;
+use crate::image::Picture;
+use glam::UVec2;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -31,6 +34,7 @@ impl Viewer {
         self.moving = published.moving;
         self.layer.clone_from(&published.layer);
         self.status.clone_from(&published.status);
+        self.loading.clone_from(&published.loading);
     }
 
     /// Presents at once, or later if nobody misses it and it costs CPU time.
@@ -60,6 +64,8 @@ impl Viewer {
         if !self.visible {
             return;
         }
+        let screen_size = self.screen.as_ref().map_or(UVec2::ONE, Screen::size);
+        let drawn = self.drawn_region();
         let Some(screen) = &mut self.screen else {
             return;
         };
@@ -67,11 +73,16 @@ impl Viewer {
         let content = Content {
             status: self.status.as_ref(),
             measured,
-            loading: self.status.is_none().then_some(self.options.screenshot_stem.as_str()),
+            loading: self.loading.as_deref(),
             notice: &self.notice,
             keys: &self.options.keys,
             letters: &self.letters,
         };
+        let region = drawn.map(|corners| corners.map(|at| (at * screen_size.as_dvec2()).as_uvec2()));
+        let region = region.map(|[a, b]| [a.min(b), a.max(b)]).or_else(|| {
+            let [left, top, width, height] = self.status.as_ref().filter(|s| s.size == screen_size)?.region?;
+            Some([UVec2::new(left, top), UVec2::new(left + width, top + height)])
+        });
         let compare = self.held[Hold::Compare as usize];
         let picture = self.kept.as_ref().filter(|_| compare).unwrap_or(&self.picture);
         let (ui, layer) = (&mut self.ui, self.layer.as_ref().filter(|_| !compare));
@@ -84,6 +95,9 @@ impl Viewer {
             // After a resize the old layer would lie beside what it is about.
             if let Some(layer) = layer.as_ref().filter(|layer| layer.size == size && picture.size == size) {
                 layer.cover(bytes);
+            }
+            if let Some(region) = region.filter(|_| ui.level != Level::None) {
+                crop::outline(bytes, size, region);
             }
             if !ui.is_bare(&content) {
                 ui.draw(bytes, size, scale_factor, &content);
@@ -169,16 +183,50 @@ impl Viewer {
     }
 
     /// Remembers what is seen now.
-    pub(super) fn keep_picture(&mut self) {
-        self.kept = Some(self.picture.clone());
+    pub(super) fn keep_picture(&mut self, picture: Picture) {
+        self.kept = Some(picture);
         self.say("kept: hold K to see it".to_owned());
     }
 
-    /// Writes a file on a thread of its own.
-    pub(super) fn save_screenshot(&mut self, with_hud: bool) {
+    /// Whether the picture shows more than the film.
+    pub(super) fn is_altered(&self) -> bool {
+        self.status.as_ref().is_some_and(|status| status.kept > 0.0 || status.smoothed)
+    }
+
+    /// The engine has made the picture of the film alone that `tap` needs.
+    pub(super) fn take_plain(&mut self, tap: Tap, picture: Picture) {
+        if tap == Tap::Keep {
+            self.keep_picture(picture);
+        } else {
+            self.save_screenshot(tap == Tap::ScreenshotWithHud, Some(&picture));
+        }
+    }
+
+    /// Writes what the window shows, or `plain` in place of its picture, to a file, on a thread of its own.
+    pub(super) fn save_screenshot(&mut self, with_hud: bool, plain: Option<&Picture>) {
         let Some(screen) = &self.screen else { return };
         let size = screen.size();
-        let bytes = if with_hud {
+        let bytes = if let Some(plain) = plain {
+            let mut bytes = vec![0; size.element_product() as usize * 4];
+            screenshot::scale_into(&plain.rgba, plain.size, &mut bytes, size);
+            if with_hud {
+                let scale_factor = screen.window.scale_factor();
+                let status = self.status.as_ref().map(|s| Status { kept: 0.0, smoothed: false, ..s.clone() });
+                let content = Content {
+                    status: status.as_ref(),
+                    measured: self.measured(),
+                    loading: None,
+                    notice: "",
+                    keys: &self.options.keys,
+                    letters: &self.letters,
+                };
+                if let Some(layer) = self.layer.as_ref().filter(|layer| layer.size == size) {
+                    layer.cover(&mut bytes);
+                }
+                self.ui.draw(&mut bytes, size, scale_factor, &content);
+            }
+            bytes
+        } else if with_hud {
             screen.bytes().to_vec()
         } else if self.picture.rgba.is_empty() {
             return self.say("there is no picture yet".to_owned());

@@ -1,5 +1,7 @@
 //! The arguments with which `render` makes the picture that the window shows.
 
+use super::edit::Editor;
+use super::edit::save::edits;
 use super::flags::camera_flags;
 use super::status::percent;
 use crate::app::FrameStats;
@@ -11,7 +13,17 @@ use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
 use crate::trace::{RenderSettings, Sampling};
 use bevy_ecs::prelude::*;
 
-/// The scene, the camera, and how they look. Edits that were not saved are not in it.
+/// All that was edited since the scene was loaded, and what was then, as `[[edit]]` tables.
+fn unsaved(world: &World, origin: &SceneOrigin) -> Option<String> {
+    let editor = world.get_resource::<Editor>().filter(|editor| !editor.edited().0.is_empty());
+    let now = editor.and_then(|editor| edits(world, editor).ok());
+    match (origin.options.edits.clone(), now) {
+        (Some(before), Some(now)) => Some(format!("{before}\n{now}")),
+        (before, now) => before.or(now),
+    }
+}
+
+/// The scene, the camera, and how they look; with all edits, saved or not.
 #[must_use]
 pub fn recipe(world: &World) -> Recipe {
     let Some(origin) = world.get_resource::<SceneOrigin>() else { return Recipe::default() };
@@ -33,6 +45,12 @@ pub fn recipe(world: &World) -> Recipe {
             "--scene-settings",
             std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
         );
+    }
+    if let Some(path) = &origin.options.sky {
+        add("--hdri", std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string());
+    }
+    if let Some(edits) = unsaved(world, origin) {
+        add("--edits", edits);
     }
     add("--resolution", format!("{}x{}", settings.size.x, settings.size.y));
     add("--spp", format!("{}", stats.samples_per_pixel.round().max(1.0)));

@@ -12,43 +12,72 @@ use super::pixel_view::PixelView;
 use crate::app::{App, FrameBudget};
 use crate::image::Display;
 use crate::load::settings::edit::change;
-use crate::load::{LoadOptions, SceneSource};
+use crate::load::{LoadOptions, SceneSource, Watcher};
 use crate::open::{SceneOrigin, Wishes, open};
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Transform};
+use crate::shown::Shown;
 use crate::sync::BlasCache;
 use crate::trace::{Film, RenderSettings};
 use bevy_ecs::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Loads `path` in place of what `app` shows, with the same settings.
 ///
 /// # Errors
 /// Why it cannot be shown; `app` is as it was then.
-pub fn open_other(app: &App, path: &Path) -> Result<App, String> {
+pub fn open_other(app: &App, path: &Path, watcher: Watcher) -> Result<App, String> {
     let source = SceneSource::File(path.to_path_buf());
     let settings = app.world.resource::<RenderSettings>();
     let wishes =
         Wishes { size: Some(settings.size), integrator: Some(settings.integrator), ..Wishes::default() };
-    let mut other = open(&source, &LoadOptions::default(), &wishes).map_err(|error| error.to_string())?.app;
+    let mut other = open(&source, &LoadOptions { watcher, ..LoadOptions::default() }, &wishes)
+        .map_err(|error| error.to_string())?
+        .app;
     let budget = app.world.resource::<FrameBudget>().clone();
-    other.world.insert_resource(budget);
+    other.world.insert_resource(FrameBudget { region: None, ..budget });
+    keep_switches(app, &mut other);
     other.world.insert_resource(Instrument::default().moved());
     Ok(other)
+}
+
+/// Whether `path` is a picture of all directions, not a scene.
+#[must_use]
+pub fn is_sky(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    matches!(ending.as_deref(), Some("hdr" | "exr"))
+}
+
+/// Loads the scene again under this sky.
+///
+/// # Errors
+/// Why it cannot be shown; `app` is as it was then.
+pub fn set_sky(app: &mut App, sky: PathBuf, watcher: Watcher) -> Result<App, String> {
+    let mut origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
+    let before = origin.clone();
+    origin.options.sky = Some(sky);
+    app.world.insert_resource(origin);
+    let loaded = load_again(app, watcher);
+    if loaded.is_err() {
+        app.world.insert_resource(before);
+    }
+    loaded
 }
 
 /// Loads the scene again and gives it the camera, the edits and all settings of `app`.
 ///
 /// # Errors
 /// Why it cannot be shown; `app` is as it was then.
-pub fn load_again(app: &mut App) -> Result<App, String> {
+pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     let origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
     let settings = *app.world.resource::<RenderSettings>();
     let wishes = Wishes { size: Some(settings.size), exposure: Some(0.0), ..Wishes::default() };
-    let mut again = open(&origin.source, &origin.options, &wishes).map_err(|error| error.to_string())?.app;
+    let options = LoadOptions { watcher, ..origin.options.clone() };
+    let mut again = open(&origin.source, &options, &wishes).map_err(|error| error.to_string())?.app;
     again.world.insert_resource(settings);
     again.world.insert_resource(Film::new(settings.size, app.world.resource::<Film>().first_sample()));
     keep::<Display>(app, &mut again);
     keep::<FrameBudget>(app, &mut again);
+    keep_switches(app, &mut again);
     // Meshes that are the same are not built again.
     keep::<BlasCache>(app, &mut again);
     keep::<Bookmarks>(app, &mut again);
@@ -68,6 +97,14 @@ pub fn load_again(app: &mut App) -> Result<App, String> {
     }
     keep_camera(app, &mut again);
     Ok(again)
+}
+
+/// What is shown beside the film, or not.
+fn keep_switches(from: &App, to: &mut App) {
+    let shown = from.world.resource::<Shown>();
+    let switches = (shown.only_film, shown.never_smooth);
+    let mut shown = to.world.resource_mut::<Shown>();
+    (shown.only_film, shown.never_smooth) = switches;
 }
 
 fn keep<T: Resource + Clone>(from: &App, to: &mut App) {

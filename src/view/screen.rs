@@ -93,21 +93,7 @@ impl Screen {
         self.window.pre_present_notify();
         let outcome = self.pixels.render();
         let device_error = lock(&self.device_error).take();
-        match (outcome, device_error) {
-            (Ok(()), None) => {
-                self.failures = 0;
-                Presented::Yes
-            }
-            (Err(Error::Surface(SurfaceError::OutOfMemory)), _) => {
-                Presented::Lost("no graphics memory is left".into())
-            }
-            (Ok(()), Some(error)) if self.failures > 2 * PATIENCE => Presented::Lost(error),
-            (Ok(()) | Err(Error::Surface(_)), _) => {
-                self.failures += 1;
-                Presented::Later(Duration::from_millis(if self.failures > PATIENCE { 50 } else { 4 }))
-            }
-            (Err(error), _) => Presented::Lost(with_sources(&error)),
-        }
+        became(outcome, device_error, &mut self.failures)
     }
 
     /// The bytes drawn last.
@@ -119,6 +105,25 @@ impl Screen {
     pub fn toggle_full_screen(&self) {
         let full = self.window.fullscreen().is_none().then_some(Fullscreen::Borderless(None));
         self.window.set_fullscreen(full);
+    }
+}
+
+/// What became of a picture, given what the surface and the device say, after so many failures in a row.
+fn became(outcome: Result<(), Error>, device_error: Option<String>, failures: &mut u32) -> Presented {
+    match (outcome, device_error) {
+        (Ok(()), None) => {
+            *failures = 0;
+            Presented::Yes
+        }
+        (Err(Error::Surface(SurfaceError::OutOfMemory)), _) => {
+            Presented::Lost("no graphics memory is left".into())
+        }
+        (Ok(()), Some(error)) if *failures > 2 * PATIENCE => Presented::Lost(error),
+        (Ok(()) | Err(Error::Surface(_)), _) => {
+            *failures += 1;
+            Presented::Later(Duration::from_millis(if *failures > PATIENCE { 50 } else { 4 }))
+        }
+        (Err(error), _) => Presented::Lost(with_sources(&error)),
     }
 }
 
@@ -156,6 +161,35 @@ pub fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lost_surface_is_asked_again_ever_more_rarely_and_is_as_good_as_new_when_it_is_back() {
+        let pause = |ms| Presented::Later(Duration::from_millis(ms));
+        for error in [SurfaceError::Lost, SurfaceError::Outdated, SurfaceError::Timeout, SurfaceError::Other]
+        {
+            let mut failures = 0;
+            for i in 0..500 {
+                let said = became(Err(Error::Surface(error.clone())), None, &mut failures);
+                assert_eq!(said, pause(if i < PATIENCE { 4 } else { 50 }), "{error:?} number {i}");
+            }
+            assert_eq!(became(Ok(()), None, &mut failures), Presented::Yes);
+            assert_eq!(became(Err(Error::Surface(error)), None, &mut failures), pause(4));
+        }
+    }
+
+    #[test]
+    fn what_will_not_come_back_ends_the_window_with_its_reason() {
+        let mut failures = 0;
+        let full = became(Err(Error::Surface(SurfaceError::OutOfMemory)), None, &mut failures);
+        assert_eq!(full, Presented::Lost("no graphics memory is left".to_owned()));
+        // A device that complains may come to itself, but not for ever.
+        let mut said = Presented::Yes;
+        for _ in 0..2 * PATIENCE + 2 {
+            said = became(Ok(()), Some("gone".to_owned()), &mut failures);
+        }
+        assert_eq!(said, Presented::Lost("gone".to_owned()));
+        assert!(matches!(became(Err(Error::AdapterNotFound), None, &mut 0), Presented::Lost(_)));
+    }
 
     #[test]
     fn a_quiet_panic_is_its_message() {

@@ -39,6 +39,16 @@ pub struct Status {
     pub rays_per_second: f64,
     /// Side of a preview pixel.
     pub preview_scale: Option<u32>,
+    /// Share of the pixels that show samples of another view.
+    pub kept: f64,
+    /// Whether the picture is shown smoothed.
+    pub smoothed: bool,
+    /// The part of the picture that is refined, if not all: left, top, width, height in pixels.
+    pub region: Option<[u32; 4]>,
+    /// What loading has found.
+    pub card: Arc<str>,
+    /// What the machine holds and does, for who wants to know all.
+    pub machine: Machine,
     /// How often the film was reset.
     pub resets: u64,
     /// Samples dropped because they were not finite.
@@ -61,6 +71,21 @@ pub struct Status {
     pub isa: &'static str,
 }
 
+/// What the machine holds and does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Machine {
+    /// Threads that trace.
+    pub threads: usize,
+    /// Instances, triangles of all of them, and lights.
+    pub counts: [usize; 3],
+    /// Bytes of the film, of what is kept to be shown, and of the hierarchy.
+    pub bytes: [usize; 3],
+    /// Seconds that the last first picture took: its preview, and what was carried over.
+    pub first_picture: [f64; 2],
+    /// Seconds that the last development took.
+    pub developing: f64,
+}
+
 /// How much is told.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Level {
@@ -69,8 +94,10 @@ pub enum Level {
     /// What one wants to know while flying.
     #[default]
     Short,
-    /// All.
+    /// How the picture is made.
     Long,
+    /// All, also of the machine.
+    All,
 }
 
 impl Level {
@@ -80,7 +107,8 @@ impl Level {
         match self {
             Self::None => Self::Short,
             Self::Short => Self::Long,
-            Self::Long => Self::None,
+            Self::Long => Self::All,
+            Self::All => Self::None,
         }
     }
 }
@@ -140,6 +168,15 @@ pub fn caution(status: &Status) -> Option<String> {
     if let Some(scale) = status.preview_scale.filter(|&scale| scale > 1) {
         said.push(format!("preview 1/{scale}"));
     }
+    if status.kept > 0.0 {
+        said.push(format!("kept {:.0} %", status.kept * 100.0));
+    }
+    if status.smoothed {
+        said.push("smoothed".to_owned());
+    }
+    if let Some([left, top, width, height]) = status.region {
+        said.push(format!("only {width} × {height} at {left}, {top}"));
+    }
     if status.dropped > 0 {
         said.push(format!("{} samples dropped: not finite", status.dropped));
     }
@@ -166,6 +203,23 @@ pub fn details(status: &Status, measured: Measured) -> Vec<Cell> {
         plain("pictures", format!("{} / s", significant(measured.pictures_per_second, 3))),
         plain("response", latency),
         plain("restarts", status.resets.to_string()),
+    ]
+}
+
+/// What the machine holds and does.
+#[must_use]
+pub fn machine(status: &Status) -> Vec<Cell> {
+    let plain = |label, value: String| cell(label, value, String::new());
+    let Machine { threads, counts, bytes, first_picture, developing } = status.machine;
+    let [instances, triangles, lights] = counts;
+    let [film, shown, hierarchy] = bytes.map(|bytes| significant(bytes as f64 / 1e6, 3));
+    let [preview, carried] = first_picture.map(|seconds| significant(seconds * 1e3, 2));
+    vec![
+        plain("scene", format!("{triangles} triangles, {instances} instances, {lights} lights")),
+        plain("memory", format!("film {film}, shown {shown}, hierarchy {hierarchy} MB")),
+        plain("first picture", format!("preview {preview}, kept {carried} ms")),
+        plain("development", format!("{} ms", significant(developing * 1e3, 2))),
+        plain("threads", threads.to_string()),
     ]
 }
 
@@ -227,6 +281,11 @@ pub(super) mod tests {
             recipe: Recipe::default(),
             rays_per_second: 1.234_5e6,
             preview_scale: Some(4),
+            kept: 0.0,
+            smoothed: false,
+            region: None,
+            card: Arc::from("a.obj: valid"),
+            machine: Machine::default(),
             resets: 3,
             dropped: 0,
             exposure: 1.0 / 3.0,
@@ -250,6 +309,8 @@ pub(super) mod tests {
         let mut status = status();
         assert_eq!(text(&headline(&status)), "noise —; samples 2.8 / 64; time left —");
         assert_eq!(caution(&status).unwrap(), "preview 1/4");
+        (status.kept, status.smoothed, status.region) = (0.876, true, Some([8, 16, 64, 32]));
+        assert_eq!(caution(&status).unwrap(), "preview 1/4  kept 88 %  smoothed  only 64 × 32 at 8, 16");
         status.noise = Some((0.012_34, 0.000_51));
         let forecast = Some(Forecast { goal: 0.01, seconds: 12.3 });
         let point = Point { seconds: 1.0, samples: 2.75, noise: 0.012, doubt: 0.0, error: Some(0.02) };

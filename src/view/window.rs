@@ -11,6 +11,7 @@ use super::ui::Ui;
 use super::{Response, ViewError, ViewOptions};
 use crate::app::App;
 use crate::image::Picture;
+use crate::load::Watcher;
 use glam::{DVec2, UVec2};
 use std::collections::{HashSet, VecDeque};
 use std::convert::Infallible;
@@ -36,7 +37,7 @@ const NOTICE: Duration = Duration::from_secs(6);
 const FAREWELL: Duration = Duration::from_secs(2);
 
 /// Makes the app, on the engine's thread.
-pub type Open = Box<dyn FnOnce() -> Result<App, String> + Send>;
+pub type Open = Box<dyn FnOnce(Watcher) -> Result<App, String> + Send>;
 
 /// The window's side of everything.
 pub struct Viewer {
@@ -61,6 +62,8 @@ pub struct Viewer {
     pub(super) kept: Option<Picture>,
     pub(super) layer: Option<Arc<Layer>>,
     pub(super) status: Option<Status>,
+    /// What is loading, and how far it is.
+    pub(super) loading: Option<String>,
     pub(super) moving: bool,
     pub(super) asked: Option<Instant>,
     pub(super) ui: Ui,
@@ -131,6 +134,7 @@ impl Viewer {
             kept: None,
             layer: None,
             status: None,
+            loading: None,
             moving: true,
             asked: None,
             ui: Ui::default(),
@@ -178,11 +182,14 @@ impl Viewer {
         let (commands, receiver) = channel();
         let (alive, ended) = channel();
         let interrupt = Arc::new(AtomicBool::new(false));
-        let published = Arc::new(Mutex::new(Published::default()));
+        let name = &self.options.screenshot_stem;
+        let loading = Some(format!("loading {name} …"));
+        let published = Arc::new(Mutex::new(Published { loading, ..Published::default() }));
         let proxy = self.proxy.clone();
         let reference = self.options.reference.take();
         let engine = Engine {
             reference,
+            scene: name.clone(),
             commands: receiver,
             own: commands.clone(),
             interrupt: Arc::clone(&interrupt),
@@ -280,6 +287,7 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.options.screenshot_stem = name;
                 self.redraw();
             }
+            Wake::Plain(tap, picture) => self.take_plain(tap, picture),
             Wake::Reference(picture) => self.kept = Some(picture),
             Wake::OpenFailed(why) => self.fail(event_loop, ViewError::Scene(why)),
             Wake::Crashed(why) => self.fail(event_loop, ViewError::Lost(format!("internal error: {why}"))),

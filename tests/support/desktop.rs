@@ -68,7 +68,7 @@ pub fn pause(milliseconds: u64) {
 }
 
 impl Desktop {
-    fn open(test: &str) -> Self {
+    pub fn open(test: &str) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let directory = std::env::temp_dir().join(format!("penumbra-{test}-{}", std::process::id()));
         std::fs::create_dir_all(&directory).unwrap();
@@ -192,8 +192,8 @@ impl Desktop {
 
     /// Waits until nothing but the picture is seen: no notice, no status lines.
     pub fn hide_status(&self, program: &mut Program) {
-        // Short, long, none.
-        self.xdotool(["key", "z", "key", "z"]);
+        // Short, long, all, none.
+        self.xdotool(["key", "z", "key", "z", "key", "z"]);
         self.wait_until_done(program);
     }
 }
@@ -242,4 +242,23 @@ pub fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
     assert_eq!(a.dimensions(), b.dimensions());
     let differing = a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count();
     differing as f64 / f64::from(a.width() * a.height())
+}
+
+pub const SMALL: &[&str] = &["--resolution", "320x240", "--spp", "4"];
+
+/// In the order of their numbers (up to nine).
+pub fn pictures_in(directory: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> =
+        entries.filter(|path| path.extension().is_some_and(|e| e == "png")).collect();
+    files.sort();
+    files
+}
+
+/// Pixels in which green is far above red and blue, and those in which red is above both.
+pub fn green_and_red(picture: &RgbImage) -> (usize, usize) {
+    let above = |a: u8, b: u8, c: u8| i32::from(a) > i32::from(b.max(c)) + 60;
+    let green = picture.pixels().filter(|p| above(p[1], p[0], p[2])).count();
+    let red = picture.pixels().filter(|p| above(p[0], p[1], p[2])).count();
+    (green, red)
 }

@@ -5,7 +5,7 @@ use crate::headless;
 use crate::{exit, signal::set_threads};
 use penumbra::cli::WindowArgs;
 #[cfg(feature = "view")]
-use penumbra::{app::FrameBudget, open::open, render::open_reference, trace::RenderSettings};
+use penumbra::{app::FrameBudget, open::open, render::open_reference, shown::Shown, trace::RenderSettings};
 
 /// Where the window comes to rest, if nobody says.
 #[cfg(feature = "view")]
@@ -51,16 +51,22 @@ pub fn run(args: &WindowArgs) -> u8 {
         record,
         exit_after: None,
     };
-    let load = args.scene.load_options();
-    let opened = penumbra::view::run(options, move || match open(&source, &load, &wishes) {
-        Ok(mut opened) => {
-            headless::tell(&opened.report);
-            let mut budget = opened.app.world.resource_mut::<FrameBudget>();
-            budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
-            budget.adaptive = opened.samples.is_none() && !even;
-            Ok(opened.app)
+    let mut load = args.scene.load_options();
+    let (only_film, never_smooth) = (args.no_kept_samples, args.no_smoothing);
+    let opened = penumbra::view::run(options, move |watcher| {
+        load.watcher = watcher;
+        match open(&source, &load, &wishes) {
+            Ok(mut opened) => {
+                let mut shown = opened.app.world.resource_mut::<Shown>();
+                (shown.only_film, shown.never_smooth) = (only_film, never_smooth);
+                headless::tell(&opened.report);
+                let mut budget = opened.app.world.resource_mut::<FrameBudget>();
+                budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
+                budget.adaptive = opened.samples.is_none() && !even;
+                Ok(opened.app)
+            }
+            Err(error) => Err(error.to_string()),
         }
-        Err(error) => Err(error.to_string()),
     });
     match opened {
         Ok(response) => {

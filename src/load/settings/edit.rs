@@ -178,6 +178,7 @@ pub fn spectra(light: &mut Light) -> Vec<&mut Vec3> {
         Light::Disk { radiance, .. } | Light::Sphere { radiance, .. } | Light::Environment { radiance } => {
             vec![radiance]
         }
+        Light::Sky { scale, .. } => vec![scale],
     }
 }
 
@@ -185,7 +186,7 @@ pub fn spectra(light: &mut Light) -> Vec<&mut Vec3> {
 #[must_use]
 pub fn sizes(light: &Light) -> Vec<f32> {
     match light {
-        Light::Point { .. } | Light::Environment { .. } => Vec::new(),
+        Light::Point { .. } | Light::Environment { .. } | Light::Sky { .. } => Vec::new(),
         Light::Spot { inner_angle, outer_angle, .. } => vec![*inner_angle, *outer_angle],
         Light::Directional { angle, .. } => vec![*angle],
         Light::Segment { half_length, .. } => vec![*half_length],

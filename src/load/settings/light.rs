@@ -1,5 +1,6 @@
 //! The `[[light]]` tables.
 
+use super::super::sky;
 use super::{Check, Settings};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
@@ -62,7 +63,10 @@ pub(super) enum LightTable {
         angle: f32,
     },
     Environment {
-        radiance: [f32; 3],
+        radiance: Option<[f32; 3]>,
+        image: Option<String>,
+        #[serde(default)]
+        turn: f32,
     },
 }
 
@@ -99,6 +103,22 @@ pub(super) fn spawn(
     let name = format!("light {index} ({kind})");
     if let Some(problem) = check.problem {
         return Err(settings.broken(table, &name, problem));
+    }
+    let mut light = light;
+    if let Light::Environment { radiance } = light
+        && sink.options.sky.is_some()
+    {
+        let _ = radiance;
+        sink.ignored(&settings.file, &name, "another sky was asked for");
+        return Ok(());
+    }
+    if let (LightTable::Environment { image: Some(image), .. }, Light::Environment { radiance }) =
+        (table.get_ref(), &light)
+    {
+        let Some(path) = settings.folder.path(image) else {
+            return Err(settings.broken(table, &name, "image: there is no file in a built-in scene"));
+        };
+        light = Light::Sky { sky: sky::read(&path, &sink.budget)?, scale: *radiance };
     }
     let entity = sink.spawn((Name::new(name), transform, light));
     if let Some(visible) = visible {
@@ -193,9 +213,13 @@ fn convert(table: &LightTable, check: &mut Check) -> (&'static str, Transform, L
             };
             ("directional", along(check, DVec3::ZERO, "direction", *direction), light, None)
         }
-        LightTable::Environment { radiance } => {
-            let radiance: Vec3 = check.spectrum("radiance", *radiance);
-            ("environment", Transform::default(), Light::Environment { radiance }, None)
+        LightTable::Environment { radiance, image, turn } => {
+            check.that(radiance.is_some() || image.is_some(), || "needs a radiance or an image".to_owned());
+            let radiance: Vec3 = check.spectrum("radiance", radiance.unwrap_or([1.0; 3]));
+            check.that(turn.is_finite(), || "turn must be finite".to_owned());
+            let mut transform = Transform::default();
+            transform.0.matrix3 = DMat3::from_rotation_y(f64::from(*turn).to_radians());
+            ("environment", transform, Light::Environment { radiance }, None)
         }
     }
 }

@@ -84,7 +84,7 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         rows.push(Row { property, label, value: value + 0.0, step, grows, range });
     };
     let light = world.get::<Light>(entity);
-    let has_place = !matches!(light, Some(Light::Environment { .. }));
+    let has_place = !matches!(light, Some(Light::Environment { .. } | Light::Sky { .. }));
     if let Some(place) = world.get::<GlobalTransform>(entity).filter(|_| has_place) {
         let (scale, rotation, translation) = parts(&place.0);
         for axis in 0..3 {

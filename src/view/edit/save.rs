@@ -68,9 +68,15 @@ pub fn text(world: &World, editor: &Editor) -> Result<(String, PathBuf), String>
         // Its textures are named from where it is.
         folder = own.parent().map_or(folder, PathBuf::from);
     }
-    let edits =
-        toml::to_string(&Tables { edit: tables(world, editor) }).map_err(|error| error.to_string())?;
-    Ok((text + &edits, folder))
+    Ok((text + &edits(world, editor)?, folder))
+}
+
+/// The edits alone.
+///
+/// # Errors
+/// What cannot be written down.
+pub fn edits(world: &World, editor: &Editor) -> Result<String, String> {
+    toml::to_string(&Tables { edit: tables(world, editor) }).map_err(|error| error.to_string())
 }
 
 /// Writes the first of `{scene}.edits_1.toml`, `_2` … that is not there, and says how to render it.

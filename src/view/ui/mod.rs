@@ -5,7 +5,9 @@ pub mod edit;
 pub mod graph;
 pub mod help;
 pub mod legend;
+pub mod open;
 pub mod paint;
+pub mod report;
 pub mod strip;
 pub mod style;
 
@@ -46,6 +48,10 @@ pub struct Ui {
     pub level: Level,
     /// Whether the help is open.
     pub help: bool,
+    /// Whether the report of loading is open.
+    pub report: bool,
+    /// The line that asks for a file, if it is open.
+    pub prompt: Option<open::Prompt>,
     /// Whether the graph is open.
     pub graph: bool,
     context: Context,
@@ -64,6 +70,8 @@ impl Default for Ui {
         Self {
             level: Level::default(),
             help: false,
+            report: false,
+            prompt: None,
             graph: false,
             context,
             painter,
@@ -172,13 +180,18 @@ impl Ui {
             && content
                 .status
                 .is_none_or(|status| status.debug == DebugStatus::default() && status.edit.is_none());
-        self.level == Level::None && !self.help && !self.graph && silent
+        self.level == Level::None
+            && !self.help
+            && !self.report
+            && self.prompt.is_none()
+            && !self.graph
+            && silent
     }
 
     fn show(&mut self, context: &Context, content: &Content) {
         if let Some(status) = content.status {
             if self.level != Level::None {
-                strip::show(context, status, content.measured, self.level == Level::Long);
+                strip::show(context, status, content.measured, self.level);
             }
             if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None) {
                 legend::show(context, legend);
@@ -191,9 +204,15 @@ impl Ui {
                 graph::show(context, &status.graph);
             }
         }
-        if let Some(name) = content.loading {
+        if let Some(status) = content.status.filter(|_| self.report) {
+            report::show(context, &status.card);
+        }
+        if let Some(prompt) = &self.prompt {
+            open::show(context, prompt);
+        }
+        if let Some(text) = content.loading {
             card(context, "loading", Align2::CENTER_CENTER, vec2(0.0, 0.0), |ui| {
-                ui.label(RichText::new(format!("loading {name} …")).size(16.0));
+                ui.label(RichText::new(text).size(16.0));
             });
         }
         if self.help {
@@ -261,7 +280,8 @@ mod tests {
         for (width, height) in [(1, 1), (3, 200), (200, 3), (40, 30), (321, 241), (1920, 1080)] {
             for display in [0.0, 1.0, 1.25, 2.0, 3.5] {
                 let open = |ui: &mut Ui| {
-                    (ui.help, ui.graph, ui.level) = (true, true, Level::Long);
+                    (ui.help, ui.graph, ui.level) = (true, true, Level::All);
+                    (ui.report, ui.prompt) = (true, Some(open::Prompt::new("")));
                 };
                 drawn(UVec2::new(width, height), display, open, 90);
             }

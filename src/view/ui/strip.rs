@@ -1,12 +1,12 @@
 //! The status: a strip of values, and below it all the others.
 
-use super::super::status::{Cell, Measured, Status, caution, details, headline};
+use super::super::status::{Cell, Level, Measured, Status, caution, details, headline, machine};
 use super::card;
 use super::style::{BRIGHT, CAUTION, FAINT, MARGIN};
 use egui::{Align2, Context, Grid, RichText, Ui, vec2};
 
-/// Shows the strip, and `all` the rest.
-pub fn show(context: &Context, status: &Status, measured: Measured, all: bool) {
+/// Shows the strip, and as much of the rest as `level` wants.
+pub fn show(context: &Context, status: &Status, measured: Measured, level: Level) {
     card(context, "status", Align2::LEFT_TOP, vec2(MARGIN, MARGIN), |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 18.0;
@@ -17,10 +17,17 @@ pub fn show(context: &Context, status: &Status, measured: Measured, all: bool) {
         if let Some(text) = caution(status) {
             ui.label(RichText::new(text).color(CAUTION).small());
         }
-        if all {
+        let mut cells = Vec::new();
+        if matches!(level, Level::Long | Level::All) {
+            cells = details(status, measured);
+        }
+        if level == Level::All {
+            cells.extend(machine(status));
+        }
+        if !cells.is_empty() {
             ui.add_space(2.0);
             Grid::new("details").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
-                for cell in details(status, measured) {
+                for cell in cells {
                     ui.label(RichText::new(cell.label).color(FAINT));
                     ui.label(cell.value);
                     ui.end_row();
