@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::FrameBudget;
 use penumbra::scene::{Alpha, Light, Material};
 use penumbra::trace::{Integrator, RenderSettings};
-use stage::{Stage, ball, cube, quad, settings};
+use stage::{Frames as _, Stage, ball, cube, quad, settings};
 
 const SIZE: u32 = 32;
 const SEEDS: u32 = 48;
