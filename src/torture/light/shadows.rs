@@ -5,7 +5,7 @@ use super::meter::{Plan, measure, ours};
 use super::oracle::{self, Line};
 use super::spot::{Expected, Spot, opaque, panel};
 use crate::scene::Emission;
-use crate::torture::{Case, Check, Effort, Trial};
+use crate::torture::{Case, Check, Effort, Place, Trial};
 use glam::DVec3;
 
 /// Height of the light.
@@ -29,14 +29,16 @@ fn under_an_edge(x: f64, h: f64) -> Spot {
         .with(panel(DVec3::new(-0.5, -0.5, HEIGHT), DVec3::X, DVec3::Y))
         .half(0.5 * edge);
     let lit = Spot { computed: true, eye: 0.5 * h, ..lit };
-    let half_plane = opaque(DVec3::new(-100.0, -100.0, h), DVec3::X * 100.0, DVec3::Y * 200.0);
-    let hidden = lit.clone().with(half_plane);
+    // In proportion to its height: the place of a large one is known less well where it is far from the origin.
+    let edge_at = |z: f64| {
+        opaque(DVec3::new(-100.0 * h, -100.0 * h, z), DVec3::X * (100.0 * h), DVec3::Y * (200.0 * h))
+    };
+    let hidden = lit.clone().with(edge_at(h));
     if x < -edge {
         hidden.expecting(Expected::Dark)
     } else if x > edge {
         // A camera and a render space as with it.
-        let aside = opaque(DVec3::new(-100.0, -100.0, -h), DVec3::X * 100.0, DVec3::Y * 200.0);
-        hidden.expecting(Expected::Same(Box::new(lit.with(aside))))
+        hidden.expecting(Expected::Same(Box::new(lit.with(edge_at(-h)))))
     } else {
         hidden.with_condition(condition)
     }
@@ -82,10 +84,21 @@ pub fn shadows_of_a_line() -> Vec<Spot> {
     spots
 }
 
+/// 201 places at the origin, and 41 elsewhere; all everywhere if there is time.
 fn edges(trial: &Trial<'_>, id: &'static str, h: f64) -> Vec<Check> {
-    let count = if trial.effort == Effort::Quick { 11 } else { 201 };
-    let plan = Plan { together: true, samples: [1 << 13, 1 << 15, 1 << 23], ..Plan::of(id) };
-    measure(trial, plan, &penumbra(h, count), &|ask| ours(ask, &|| !trial.interrupted()))
+    let [here, elsewhere] = match trial.effort {
+        Effort::Quick => [11, 11],
+        Effort::Normal => [201, 41],
+        Effort::Long => [201, 201],
+    };
+    const ALL: &[Place] = &Place::ALL;
+    let (origin, others) = ALL.split_at(1);
+    let mut checks = Vec::new();
+    for (places, count) in [(origin, here), (others, elsewhere)] {
+        let plan = Plan { places, together: true, samples: [1 << 13, 1 << 13, 1 << 23], ..Plan::of(id) };
+        checks.extend(measure(trial, plan, &penumbra(h, count), &|ask| ours(ask, &|| !trial.interrupted())));
+    }
+    checks
 }
 
 /// As wide as its height.

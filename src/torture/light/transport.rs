@@ -122,7 +122,7 @@ fn mirrors(trial: &Trial<'_>) -> Vec<Check> {
             checks.push(all_the_same(&format!("{k} bounces, {}", place.name()), &reds(&film), exact, 1e-6));
         }
         // From the fifth bounce on paths end by chance.
-        for (k, size, samples) in [(9, 32, [512, 2048, 100_000]), (1000, 64, [0, 2048, 25_000])] {
+        for (k, size, samples) in [(9, 32, [1024, 4096, 100_000]), (1000, 64, [0, 2048, 25_000])] {
             let exact = (1.0 - r.powi(k + 1)) / (1.0 - r);
             let samples = trial.pick(samples[0], samples[1], samples[2]) as u32;
             // Long paths take long: once, and not in a hurry.
