@@ -79,7 +79,7 @@ pub fn judge_form_factor(what: &str, samples: u64, factors: &[f64], exact: f64) 
 }
 
 fn form_factors(trial: &Trial<'_>) -> Vec<Check> {
-    let (pictures, samples) = (trial.pick(16, 16, 384), trial.pick(32, 64, 64) as u32);
+    let (pictures, samples) = (trial.pick(16, 16, 384), trial.pick(32, 32, 64) as u32);
     let mut checks = Vec::new();
     for (name, light, exact) in squares() {
         for place in places(trial.effort) {

@@ -102,7 +102,7 @@ fn slopes(trial: &Trial<'_>) -> Vec<Check> {
         (Sampling::Shifted | Sampling::Sobol, 0) => Slope::Below(-0.9),
         (Sampling::Shifted | Sampling::Sobol, _) => Slope::Below(-0.7),
     };
-    let seeds = trial.pick(16, 32, 1024);
+    let seeds = trial.pick(16, 16, 1024);
     let mut checks = Vec::new();
     for (i, (name, spot)) in spots.iter().enumerate() {
         for sampling in [Sampling::Independent, Sampling::Stratified, Sampling::Shifted, Sampling::Sobol] {
@@ -161,8 +161,8 @@ fn long_run(trial: &Trial<'_>) -> Vec<Check> {
     let spot = &spots[5];
     let Expected::Value { exact, .. } = &spot.expected else { return Vec::new() };
     let exact = exact(spot.point);
-    // A pixel: 2¹⁴, 2¹⁷, or 10⁷.
-    let most = trial.pick(1 << 14, 1 << 17, 10_000_000) as u32;
+    // A pixel: 2¹⁴, 2¹⁶, or 10⁷.
+    let most = trial.pick(1 << 14, 1 << 16, 10_000_000) as u32;
     let mut checks = Vec::new();
     for sampling in [Sampling::Independent, Sampling::Sobol] {
         let chosen = RenderSettings {
