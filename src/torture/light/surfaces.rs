@@ -164,7 +164,7 @@ pub fn all_surfaces(trial: &Trial<'_>, wrong: &(dyn Fn(Vec3) -> f64 + Sync)) -> 
         count: trial.pick(20_000, 100_000, 100_000),
         seed: trial.seed.wrapping_add(12),
         cells: CELLS,
-        fine: trial.pick(512, 1024, 1024) as usize,
+        fine: 1024,
         level: 0.01,
         tests: jobs.len() as u32,
     };

@@ -215,7 +215,7 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
 fn balls_from_inside(trial: &Trial<'_>) -> Vec<Check> {
     let half = Material { double_sided: true, ..Material::lambert(Vec3::splat(0.5)) };
     let shining = Material { emission: Vec3::splat(0.5), ..half.clone() };
-    let samples = trial.pick(256, 1024, 100_000) as u32;
+    let samples = trial.pick(512, 1024, 100_000) as u32;
     let picture = |material: Material, lit: bool| {
         let mut stage = Stage::new(settings(32, 32, Integrator::Path, 1000));
         stage.add_mesh(ball(128), material, HERE);

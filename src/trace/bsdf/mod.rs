@@ -110,7 +110,8 @@ impl Bsdf {
                 phong: match glossy {
                     Glossy::BlinnPhong { specular, exponent, .. } => {
                         let texel = scene.texture(surface.glossy_texture, at.uvs);
-                        Some((*specular * texel.truncate(), exponent * texel.w))
+                        // Beyond a million it is a mirror to single precision.
+                        Some((*specular * texel.truncate(), (exponent * texel.w).min(1e6)))
                     }
                     _ => None,
                 },
