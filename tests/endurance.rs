@@ -112,7 +112,9 @@ fn act(desktop: &Desktop, program: &Program, rng: &mut Rng, step: u64) {
             desktop.xdotool(["key", TAPS[rng.below(TAPS.len())]]);
         }
         15 => {
-            let (x, y) = (20 + rng.below(280), 20 + rng.below(200));
+            // Inside: the frame around it has buttons of its own.
+            let (width, height) = desktop.size(program);
+            let (x, y) = (rng.below(width as usize), rng.below(height as usize));
             let (x, y) = (x.to_string(), y.to_string());
             let button = ["1", "3", "4", "5"][rng.below(4)];
             desktop.xdotool(["mousemove", "--window", window, &x, &y, "click", button]);
@@ -141,9 +143,9 @@ fn act(desktop: &Desktop, program: &Program, rng: &mut Rng, step: u64) {
 
 /// Waits until the help is seen, and until it is gone again: the program still answers, and paints.
 fn answers(desktop: &Desktop, program: &mut Program) {
-    desktop.xdotool(["windowsize", "--sync", &program.window, "320", "240"]);
+    desktop.xdotool(["windowsize", &program.window, "320", "240"]);
     desktop.xdotool(["key", "Escape"]);
-    pause(300);
+    pause(500);
     for _ in 0..2 {
         let before = desktop.shot(program);
         desktop.xdotool(["key", "h"]);
@@ -215,7 +217,7 @@ fn hours_of_use_leave_no_trace() {
 
 /// Edits something, saves the edits, and compares with what `render` makes of them.
 fn equal_to_a_fresh_render(desktop: &Desktop, mut program: Program, said: &std::path::Path) {
-    desktop.xdotool(["mousemove", "--window", &program.window, "160", "160", "key", "m"]);
+    desktop.xdotool(["mousemove", "--window", &program.window, "160", "122", "key", "m"]);
     pause(300);
     desktop.xdotool(["key", "ctrl+Right"]);
     pause(300);

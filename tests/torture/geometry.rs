@@ -121,7 +121,12 @@ fn an_open_edge_is_found() {
 fn a_box_that_is_too_small_is_found() {
     finds(&quick(|trial| leaks::run(trial, &sabotaged(lost))), "origin");
     finds(&quick(|trial| brute::run(trial, &sabotaged(lost))), "knot");
-    let (triangles, change) = (meshes::soup(500, 0.1, 3), lost);
+}
+
+#[test]
+fn a_hit_of_the_worst_triangles_that_is_off_is_found() {
+    let triangles = meshes::soup(500, 0.1, 3);
+    let change = |_: &[[Vec3; 3]], _: &Ray, hit| late(hit, 1);
     let saboteur = Sabotaged { blas: Blas::build(&triangles), triangles: triangles.clone(), change };
     finds(&quick(|trial| worst::hits(trial, "soup", &triangles, &[("saboteur", saboteur)])), "hits");
 }
