@@ -16,7 +16,7 @@ static TURN: Mutex<()> = Mutex::new(());
 /// An X server of our own, with a window manager if there is one.
 pub struct Desktop {
     server: Child,
-    manager: Option<Child>,
+    pub manager: Option<Child>,
     display: String,
     pub directory: PathBuf,
     _turn: MutexGuard<'static, ()>,
