@@ -158,7 +158,7 @@ fn picture(app: &mut App, samples: u32) -> Film {
 
 fn mean(film: &Film) -> DVec3 {
     let size = film.size();
-    let sum: DVec3 = (0..size.y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean()).sum();
+    let sum: DVec3 = (0..size.y).flat_map(|y| film.row(y)).map(penumbra::trace::film::Pixel::mean).sum();
     sum / f64::from(size.element_product())
 }
 
