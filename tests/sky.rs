@@ -37,7 +37,7 @@ fn the_density_is_one_over_all_directions_and_zero_only_where_it_is_black() {
     let (sky, turned) = sky();
     let light = SkyLight::new(&sky, Vec3::ONE, turned, None).unwrap();
     // Midpoints in cosine and turn: an even grid in solid angle, finer than the pixels.
-    let (mut sum, n) = (0.0, 512);
+    let (mut sum, n) = (0.0, 1024);
     for i in 0..n {
         for j in 0..n {
             let cos = 1.0 - 2.0 * (i as f32 + 0.5) / n as f32;
@@ -96,7 +96,8 @@ fn samples_are_spread_as_the_density_says() {
                     chi2 += (seen[y * width + x] - expected).powi(2) / expected;
                     cells += 1;
                 } else {
-                    assert_eq!(seen[y * width + x], 0.0);
+                    // Of those on its border.
+                    assert!(seen[y * width + x] <= 3.0);
                 }
             }
         }
@@ -106,6 +107,22 @@ fn samples_are_spread_as_the_density_says() {
     };
     assert!(statistic(1.0) < 4.75, "{}", statistic(1.0));
     assert!(statistic(1.03) > 4.75, "a wrong density is found");
+}
+
+#[test]
+fn beside_a_sun_no_pixel_is_forgotten() {
+    let pixels: Vec<Vec3> =
+        (0..4096 * 4).map(|i| if i == 5000 { Vec3::splat(1e8) } else { Vec3::ONE }).collect();
+    let sky = Sky::new(4096, pixels).unwrap();
+    let light = SkyLight::new(&sky, Vec3::ONE, Mat3::IDENTITY, None).unwrap();
+    for i in 0..4096 {
+        let turn = std::f32::consts::TAU * (i as f32 + 0.5) / 4096.0;
+        // Along the row of the sun, and along the one below.
+        for y in [0.3, -0.3] {
+            let (radiance, pdf) = light.toward(Vec3::new(turn.sin(), y, -turn.cos()).normalize());
+            assert!(pdf > 0.0 && radiance.x >= 1.0, "{i}: {pdf}");
+        }
+    }
 }
 
 /// A white floor without anything else under this light, seen from above.
@@ -171,7 +188,7 @@ fn half_a_sky_lights_by_where_it_is() {
     assert!((lit.x / 0.25 - 1.0).abs() < 6e-3, "{lit}");
     // Turned over, the band is below the horizon.
     let dark = mean(&floor(light(), DMat3::from_rotation_x(std::f64::consts::PI), Integrator::Direct));
-    assert_eq!(dark, DVec3::ZERO);
+    assert!(dark.max_element() < 1e-6, "{dark}");
 }
 
 #[test]

@@ -107,15 +107,24 @@ impl Table {
         let mut columns = Vec::with_capacity(width * height);
         for (y, row) in sky.radiance().chunks_exact(width).enumerate() {
             let weights: Vec<f64> = row.iter().map(|&pixel| f64::from(luminance(pixel))).collect();
+            let weights = with_floor(weights);
             let sum = accumulate(&weights, &mut columns);
             sums.push(sum * solid_angle(y, width, height));
             mean += row.iter().map(|pixel| pixel.as_dvec3()).sum::<DVec3>() * solid_angle(y, width, height);
         }
         let mut rows = Vec::with_capacity(height);
-        let total = accumulate(&sums, &mut rows);
+        let total = accumulate(&with_floor(sums), &mut rows);
         let mean = (mean / (4.0 * std::f64::consts::PI)).as_vec3();
         (total > 0.0 && total.is_finite()).then_some(Self { rows, columns, mean })
     }
+}
+
+/// Adds a thousandth of their mean to those that are not zero: beside a sun the share of the blue sky would be lost
+/// in the rounding of the sum, and what is never chosen is missing from the picture.
+fn with_floor(mut weights: Vec<f64>) -> Vec<f64> {
+    let floor = 1e-3 * weights.iter().sum::<f64>() / weights.len() as f64;
+    weights.iter_mut().filter(|weight| **weight > 0.0).for_each(|weight| *weight += floor);
+    weights
 }
 
 /// Appends the cumulative shares of `weights`; returns their sum. What has no weight has no share; without
