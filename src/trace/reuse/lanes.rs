@@ -80,7 +80,7 @@ impl Lanes {
                 continue;
             }
             rays.push(ray);
-            ways.push(Way { entry: self.entry[m], density: self.density[m], to: own as u32 });
+            ways.push(Way { entry: self.entry[m], density: self.density[m] });
         }
         (ways.len() - before) as u32
     }
