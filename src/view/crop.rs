@@ -64,13 +64,12 @@ pub fn outline(bytes: &mut [u8], size: UVec2, [min, max]: [UVec2; 2]) {
         let light = bytes[at..at + 3].iter().map(|&c| u32::from(c)).sum::<u32>() < 384;
         bytes[at..at + 3].fill(if light { 230 } else { 30 });
     };
-    for x in min.x..=last.x {
-        invert(x, min.y);
-        invert(x, last.y);
-    }
-    for y in min.y + 1..last.y {
-        invert(min.x, y);
-        invert(last.x, y);
+    // Each pixel once, also where two sides are one.
+    for y in min.y..=last.y {
+        let step = if y == min.y || y == last.y { 1 } else { (last.x - min.x).max(1) };
+        for x in (min.x..=last.x).step_by(step as usize) {
+            invert(x, y);
+        }
     }
 }
 
