@@ -8,7 +8,7 @@ use penumbra::image::compare::LinearImage;
 use penumbra::load::{LoadOptions, SceneSource};
 use penumbra::open::{Wishes, open};
 use penumbra::shown::Shown;
-use penumbra::trace::{Film, Integrator};
+use penumbra::trace::{Film, Integrator, RenderSettings};
 use std::time::Duration;
 
 const SIZE: UVec2 = UVec2::new(240, 136);
@@ -24,6 +24,8 @@ fn watched(scene: &str, integrator: Integrator, samples: u32, never_smooth: bool
         ..FrameBudget::default()
     });
     app.world.resource_mut::<Shown>().never_smooth = never_smooth;
+    // Neighbours that share their paths are not smoothed.
+    app.world.resource_mut::<RenderSettings>().reuse = false;
     while app.world.resource::<Film>().complete_samples() < samples {
         app.frame();
     }
@@ -89,6 +91,18 @@ fn a_finished_picture_is_not_smoothed_nor_one_that_is_compared() {
         app.world.resource::<penumbra::image::Display>(),
     );
     assert!(app.world.resource::<Picture>().rgba == plain);
+}
+
+#[test]
+fn shared_paths_are_not_smoothed() {
+    let mut app = watched("cornell", Integrator::Path, 1, false);
+    app.world.resource_mut::<RenderSettings>().reuse = true;
+    app.world.resource_mut::<FrameBudget>().time = None;
+    for _ in 0..3 {
+        app.frame();
+    }
+    assert!(app.world.resource::<Film>().complete_samples() > 0);
+    assert!(!app.world.resource::<Shown>().is_smoothed());
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::preview::Preview;
 use crate::sync::Traceable;
 use crate::trace::camera::Sheet;
 use crate::trace::place::{Place, Spot, places};
-use crate::trace::{Film, TraceScene, Viewpoint};
+use crate::trace::{Film, RenderSettings, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -266,7 +266,7 @@ pub fn develop_film(
     film: Res<Film>,
     preview: Res<Preview>,
     display: Res<Display>,
-    viewpoint: Res<Viewpoint>,
+    (viewpoint, settings): (Res<Viewpoint>, Res<RenderSettings>),
     stats: Res<FrameStats>,
     budget: Res<FrameBudget>,
     mut shown: ResMut<Shown>,
@@ -280,7 +280,9 @@ pub fn develop_film(
     shown.compose(&film, preview.film(), fade(film.complete_samples(), stats.done));
     let is_young = stats.trace_seconds - shown.began < SMOOTHED && !stats.done && !stats.begun;
     let is_noisy = film.complete_samples() > 0 && stats.noise.is_none_or(|noise| noise > NOISY);
-    let wanted = !(shown.never_smooth || shown.hold_smoothing) && is_young && is_noisy;
+    // Neighbours that share their paths have nothing left to tell each other.
+    let is_shared = settings.shares_paths();
+    let wanted = !(shown.never_smooth || shown.hold_smoothing || is_shared) && is_young && is_noisy;
     let keep_going = || !budget.interrupt.load(Ordering::Relaxed);
     shown.smoothed = (wanted && shown.is_looked_at() && shown.viewpoint == Some(*viewpoint))
         .then(|| smooth::smooth(&film, &shown.cells, &shown.places, &viewpoint.sheet(shown.size), keep_going))

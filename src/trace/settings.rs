@@ -28,6 +28,14 @@ pub struct RenderSettings {
     pub reuse: bool,
 }
 
+impl RenderSettings {
+    /// Whether neighbours share their paths, if the scene allows it.
+    #[must_use]
+    pub fn shares_paths(&self) -> bool {
+        self.reuse && self.integrator == Integrator::Path && self.max_depth > 1
+    }
+}
+
 /// How the random numbers of a pixel are spread over its samples. All give the same picture in the end;
 /// they differ in how soon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

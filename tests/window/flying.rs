@@ -85,12 +85,12 @@ fn keys_of_the_users_own_fly_and_a_bad_file_is_one_line() {
         return;
     };
     let file = desktop.directory.join("keys.toml");
-    std::fs::write(&file, "forward = 'J'\nquit = ['Ctrl+J']\n").unwrap();
+    std::fs::write(&file, "forward = 'Backslash'\nquit = ['Ctrl+Backslash']\n").unwrap();
     let keys = ["--keys", file.to_str().unwrap()];
     let mut program = desktop.start(&[SMALL, &keys].concat());
     desktop.hide_status(&mut program);
     let before = desktop.shot(&program);
-    for (key, moves) in [("w", false), ("j", true)] {
+    for (key, moves) in [("w", false), ("backslash", true)] {
         desktop.xdotool(["keydown", key]);
         pause(300);
         desktop.xdotool(["keyup", key]);
@@ -98,7 +98,7 @@ fn keys_of_the_users_own_fly_and_a_bad_file_is_one_line() {
         desktop.wait_until_done(&mut program);
         assert_eq!(difference(&before, &desktop.shot(&program)) > 0.05, moves, "{key}");
     }
-    desktop.xdotool(["key", "ctrl+j"]);
+    desktop.xdotool(["key", "ctrl+backslash"]);
     assert_eq!(program.wait().code(), Some(0));
 
     std::fs::write(&file, "forwrd = 'J'\n").unwrap();

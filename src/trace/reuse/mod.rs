@@ -16,10 +16,10 @@ mod lanes;
 
 pub(super) use group::even_out;
 
+use super::TraceScene;
 use super::film::Tile;
 use super::integrator::{Batch, Path, Work};
 use super::sampler::Sampler;
-use super::{Integrator, TraceScene};
 use crate::bvh::Ray;
 use glam::{UVec2, Vec3};
 use group::{GROUPS, Groups, MEMBERS};
@@ -112,11 +112,7 @@ struct Shared {
 /// Whether pictures of this scene are made so. Not where something is half-transparent: there sums came out up to 4 % too
 /// dark when camera rays crossed it, and why is not known.
 pub(super) fn is_on(scene: &TraceScene) -> bool {
-    let settings = scene.settings;
-    settings.reuse
-        && settings.integrator == Integrator::Path
-        && settings.max_depth > 1
-        && !scene.coverage.alpha.contains(&true)
+    scene.settings.shares_paths() && !scene.coverage.alpha.contains(&true)
 }
 
 impl Reuse {
