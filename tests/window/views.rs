@@ -104,8 +104,7 @@ fn old_samples_and_smoothing_are_told_and_switched_off_and_the_report_opens() {
     let program = desktop.start(&off);
     pause(2500);
     desktop.xdotool(["key", "r"]);
-    pause(400);
-    assert_eq!(red_letters(&status(&program)), 0);
+    wait_for("no word but that of the preview", || (red_letters(&status(&program)) == 0).then_some(()));
 }
 
 /// Pixels of the colour in which cautions are written.
