@@ -2,26 +2,11 @@
 
 use crate::geometry::shared;
 use bevy_ecs::name::Name;
-use glam::{Vec2, Vec3, Vec4};
+use glam::Vec3;
 use penumbra::load::{LoadOptions, SceneSource, load};
 use penumbra::scene::Mesh;
+use penumbra::torture::light::surfaces::floor_point;
 use penumbra::trace::bsdf::normal::clear_of_surface;
-use penumbra::trace::surface::Interaction;
-
-fn floor_point(normal: Vec3, wo: Vec3) -> Interaction {
-    Interaction {
-        position: Vec3::ZERO,
-        error: Vec3::ZERO,
-        geometric_normal: Vec3::Z,
-        normal,
-        tangent: Vec4::ZERO,
-        wo,
-        uvs: [Vec2::ZERO; 2],
-        color: Vec4::ONE,
-        front: true,
-        lifted: None,
-    }
-}
 
 #[test]
 fn a_normal_sets_in_to_turn_without_a_step() {

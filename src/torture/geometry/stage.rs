@@ -6,9 +6,10 @@ use crate::scene::{ActiveCamera, Camera, Instance, Material, Mesh, Projection, T
 use crate::sync::Instructions;
 use crate::trace::{Film, Integrator, RenderSettings};
 use bevy_ecs::prelude::*;
-use glam::{DAffine3, DVec3, UVec2, Vec3};
-use std::f64::consts::PI;
+use glam::{DAffine3, DVec3, UVec2};
 use std::sync::Arc;
+
+pub use crate::torture::stage::{ball, cube, quad};
 
 /// A world whose entities all hang under one root.
 pub struct Stage {
@@ -86,54 +87,4 @@ pub fn means(film: &Film) -> Vec<DVec3> {
 pub fn bad_pixels(film: &Film) -> u64 {
     let bad = |mean: &&DVec3| !(mean.is_finite() && mean.min_element() >= 0.0);
     means(film).iter().filter(bad).count() as u64 + film.dropped()
-}
-
-/// A parallelogram; its front is the side of `u` × `v`.
-#[must_use]
-pub fn quad(corner: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
-    TriangleMesh {
-        positions: vec![corner, corner + u, corner + u + v, corner + v],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..TriangleMesh::default()
-    }
-}
-
-/// The cube from −1 to 1, its front outside.
-#[must_use]
-pub fn cube() -> TriangleMesh {
-    let positions =
-        (0..8).map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0);
-    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    TriangleMesh {
-        positions: positions.collect(),
-        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        ..TriangleMesh::default()
-    }
-}
-
-/// A closed convex ball of radius 1 with flat facets, its front outside.
-#[must_use]
-pub fn ball(rings: u32) -> TriangleMesh {
-    let mut mesh = TriangleMesh::default();
-    let around = 2 * rings;
-    for (i, j) in (0..=rings).flat_map(|i| (0..around).map(move |j| (i, j))) {
-        let (theta, phi) =
-            (PI * f64::from(i) / f64::from(rings), 2.0 * PI * f64::from(j) / f64::from(around));
-        let p = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-        mesh.positions.push(match i {
-            0 => Vec3::Z,
-            i if i == rings => -Vec3::Z,
-            _ => p.as_vec3(),
-        });
-    }
-    for (i, j) in (0..rings).flat_map(|i| (0..around).map(move |j| (i, j))) {
-        let at = |i: u32, j: u32| i * around + j % around;
-        if i > 0 {
-            mesh.triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
-        }
-        if i + 1 < rings {
-            mesh.triangles.push([at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]);
-        }
-    }
-    mesh
 }

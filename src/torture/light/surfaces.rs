@@ -14,7 +14,8 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// A point of a floor, with this shading normal.
-fn floor_point(normal: Vec3, wo: Vec3) -> Interaction {
+#[must_use]
+pub fn floor_point(normal: Vec3, wo: Vec3) -> Interaction {
     Interaction {
         position: Vec3::ZERO,
         error: Vec3::ZERO,
