@@ -1,0 +1,17 @@
+//! The error of a moving picture with old samples kept and without, at equal *time*: `cargo bench --bench kept`.
+//!
+//! Small steps forward and to the side after a rest of 32 samples; what keeping takes is given to the picture
+//! without for more samples.
+
+#[path = "../tests/kept/flight.rs"]
+mod flight;
+
+use flight::{HEAD, flights, fly, row};
+use glam::UVec2;
+
+fn main() {
+    println!("{HEAD}");
+    for (scene, integrator, _) in flights() {
+        println!("{}", row(&scene, integrator, &fly(&scene, integrator, UVec2::new(960, 540), |took| took)));
+    }
+}
