@@ -113,7 +113,7 @@ pub fn explain(scene: &TraceScene, pixel: UVec2, samples: Range<u32>, far: f32) 
         batch.shadows.clear();
         for path in &paths {
             let mut hit = [None];
-            scene.closest_hits(&[path.ray], &mut hit, |_, key| path.sampler.hashed(key ^ path.depth));
+            scene.closest_hits(&[path.ray], &mut hit, |_, key| path.sampler.hashed(key, path.depth));
             told.segments.push(path_segment(scene, path, hit[0].as_ref(), far));
             told.arrive(scene, &mut batch, path, hit[0]);
         }
@@ -204,7 +204,7 @@ impl Explanation {
     /// Notes a ray to a light, and whether it comes through.
     fn connected(&mut self, scene: &TraceScene, shadow: &Shadow, depth: u32, far: f32) {
         let mut blocked = [false];
-        let random = |_: usize, key: u32| shadow.sampler.hashed(key ^ shadow.key);
+        let random = |_: usize, key: u32| shadow.sampler.hashed(key, shadow.key);
         scene.any_hits(&[shadow.ray], &mut blocked, &[shadow.triangle], random);
         let blocked = blocked[0] || scene.lights.blocks(&shadow.ray, shadow.light);
         let (_, visits) = scene.geometry.tlas.inspect(&shadow.ray, Order::NearFirst, true, |_| {});

@@ -230,7 +230,7 @@ impl Batch {
         hits.resize(self.rays.len(), None);
         let random = |i: usize, key: u32| {
             let path = self.path(i);
-            path.sampler.hashed(key ^ path.depth)
+            path.sampler.hashed(key, path.depth)
         };
         scene.closest_hits(&self.rays, &mut hits, random);
         self.hits = hits;
@@ -256,7 +256,7 @@ impl Batch {
         self.ignored.extend(self.shadows.iter().map(|shadow| shadow.triangle));
         self.blocked.resize(self.rays.len(), false);
         let shadows = &self.shadows;
-        let random = |i: usize, key: u32| shadows[i].sampler.hashed(key ^ shadows[i].key);
+        let random = |i: usize, key: u32| shadows[i].sampler.hashed(key, shadows[i].key);
         scene.any_hits(&self.rays, &mut self.blocked, &self.ignored, random);
         for (shadow, _) in self.shadows.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
             self.radiance[shadow.entry as usize] += shadow.contribution;

@@ -95,10 +95,11 @@ impl Sampler {
         Vec2::new(unit_float(x), unit_float(y))
     }
 
-    /// A number in [0, 1) that depends on `key` without any stratification.
+    /// A number in [0, 1) that depends on `key` and `salt` without any stratification. Keys that differ by as much
+    /// as salts do (neighbouring triangles, two bounces) still have numbers of their own.
     #[must_use]
-    pub fn hashed(&self, key: u32) -> f32 {
-        unit_float(hash(hash(self.seed ^ key) ^ self.index))
+    pub fn hashed(&self, key: u32, salt: u32) -> f32 {
+        unit_float(hash(hash(hash(self.seed ^ key).wrapping_add(salt)) ^ self.index))
     }
 }
 
@@ -220,6 +221,22 @@ fn sobol_1(index: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Whoever came through one triangle of a sheet must not for that come through the other on the next bounce.
+    #[test]
+    fn numbers_of_neighbouring_keys_and_salts_are_independent() {
+        let sampler = Sampler::new(UVec2::new(3, 5), 0, 7);
+        for [near, far] in [[(1, 0), (0, 1)], [(0, 0), (1, 1)], [(2, 1), (3, 0)], [(1, 0), (1, 1)]] {
+            let both = |i| {
+                let here = sampler.at(2 * i);
+                (here.hashed(near.0, near.1) - 0.5) * (here.hashed(far.0, far.1) - 0.5)
+            };
+            let n = 10_000;
+            let covariance = (0..n).map(|i| f64::from(both(i))).sum::<f64>() / f64::from(n);
+            // Of independent numbers: 1/12 over the root of their count; five times that.
+            assert!(covariance.abs() < 5.0 / 12.0 / f64::from(n).sqrt(), "{near:?} {far:?}: {covariance}");
+        }
+    }
 
     #[test]
     fn second_sobol_dimension_is_that_of_the_direction_numbers() {

@@ -18,7 +18,7 @@ use std::time::Duration;
 fn a_moving_picture_is_nearer_to_the_truth_with_old_samples() {
     println!("{HEAD}");
     for (scene, integrator, most) in flights() {
-        let flight = fly(&scene, integrator, UVec2::new(960, 540), |_| Duration::ZERO);
+        let flight = fly(&scene, integrator, UVec2::new(480, 270), |_| Duration::ZERO);
         println!("{}", row(&scene, integrator, &flight));
         assert!(flight.kept < most * flight.plain, "{scene}: {} is not below {}", flight.kept, flight.plain);
     }

@@ -109,8 +109,8 @@ struct Shared {
     ways: u32,
 }
 
-/// Whether pictures of this scene are made so. Not where something is half-transparent: there sums came out up to 4 % too
-/// dark when camera rays crossed it, and why is not known.
+/// Whether pictures of this scene are made so. Not where something is half-transparent: each way through it would need
+/// random numbers of its own.
 pub(super) fn is_on(scene: &TraceScene) -> bool {
     scene.settings.shares_paths() && !scene.coverage.alpha.contains(&true)
 }
