@@ -231,7 +231,7 @@ mod tests {
                 let here = sampler.at(2 * i);
                 (here.hashed(near.0, near.1) - 0.5) * (here.hashed(far.0, far.1) - 0.5)
             };
-            let n = 10_000;
+            let n = 10_000_u32;
             let covariance = (0..n).map(|i| f64::from(both(i))).sum::<f64>() / f64::from(n);
             // Of independent numbers: 1/12 over the root of their count; five times that.
             assert!(covariance.abs() < 5.0 / 12.0 / f64::from(n).sqrt(), "{near:?} {far:?}: {covariance}");

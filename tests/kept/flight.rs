@@ -1,6 +1,5 @@
 //! Flights with old samples kept and without, and how far each picture is from the truth.
 
-use bevy_ecs::prelude::*;
 use glam::{DMat3, DVec3, UVec2, Vec3};
 use penumbra::app::{App, FrameBudget, FrameStats};
 use penumbra::image::compare::LinearImage;
