@@ -39,10 +39,9 @@ fn tlas_of(meshes: &[(Arc<TriangleMesh>, DAffine3)], also: DAffine3) -> Tlas {
 }
 
 fn closest_hits(tlas: &Tlas, rays: &[Ray]) -> Vec<Option<Hit>> {
-    let all = None::<&fn(usize, &Hit) -> bool>;
     let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
-    tlas.closest_hits(rays, &mut hits, all);
-    tlas.any_hits(rays, &mut blocked, all);
+    tlas.closest_hits(rays, &mut hits, None);
+    tlas.any_hits(rays, &mut blocked, None);
     for (i, hit) in hits.iter().enumerate() {
         assert_eq!(blocked[i], hit.is_some(), "any-hit: {:?}", rays[i]);
     }

@@ -13,6 +13,7 @@ use penumbra::bvh::Ray;
 use penumbra::scene::{Glossy, Light, Material, TriangleMesh};
 use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::light::FlatLight;
+use penumbra::trace::light_tree::Receiver;
 use penumbra::trace::surface::Interaction;
 use penumbra::trace::{Integrator, Lights};
 use stage::{Estimate, Frames as _, Rng, Stage, ball, cube, quad, reds, settings};
@@ -226,8 +227,9 @@ fn a_light_of_no_use_is_no_harm() {
 #[test]
 fn lights_beyond_all_measure_are_still_chosen() {
     let lamp = |i: f32| FlatLight::Point { position: Vec3::ZERO, intensity: Vec3::splat(i) };
-    let lights = Lights::new(vec![lamp(3e38), lamp(3e38), lamp(1.0)], Vec::new(), 1.0);
-    let chances: Vec<f32> = (0..3).map(|i| lights.chance(1, i)).collect();
+    let lights = Lights::new(vec![lamp(3e38), lamp(3e38), lamp(1.0)], Vec::new());
+    let to = Receiver { point: Vec3::ZERO, normal: Vec3::Z };
+    let chances: Vec<f32> = (0..3).map(|i| lights.chance(1, i, &to)).collect();
     assert!(chances.iter().all(|&c| c > 0.0), "{chances:?}");
     assert!((chances.iter().sum::<f32>() - 1.0).abs() < 1e-6, "{chances:?}");
 }

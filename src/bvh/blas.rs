@@ -70,17 +70,17 @@ impl Blas {
     /// The nearest hit; of equally near ones that of the lowest triangle index.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut found = None;
-        self.batch::<_, false>(std::slice::from_ref(ray), |_, hit| found = hit);
-        found
+        let mut found = [None];
+        self.closest_hits(std::slice::from_ref(ray), &mut found);
+        found[0]
     }
 
     /// Whether there is any hit.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        let mut found = None;
-        self.batch::<_, true>(std::slice::from_ref(ray), |_, hit| found = hit);
-        found.is_some()
+        let mut found = [false];
+        self.any_hits(std::slice::from_ref(ray), &mut found);
+        found[0]
     }
 
     /// [`Blas::closest_hit`] for each ray, faster for that, above all where neighbours go similar ways.

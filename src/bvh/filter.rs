@@ -48,18 +48,11 @@ impl Filter for All {
     }
 }
 
-/// Those that somebody takes.
-pub(super) struct Only<'a, A>(pub &'a A);
+/// Those that somebody takes. Not generic: the kernels are compiled once, whoever is asked.
+#[derive(Clone, Copy)]
+pub(super) struct Only<'a>(pub &'a dyn Accept);
 
-impl<A> Clone for Only<'_, A> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<A> Copy for Only<'_, A> {}
-
-impl<A: Accept> Filter for Only<'_, A> {
+impl Filter for Only<'_> {
     const ALL: bool = false;
     #[inline(always)]
     fn asks(&self, instance: u32) -> bool {

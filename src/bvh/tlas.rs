@@ -151,17 +151,17 @@ impl Tlas {
     /// The nearest hit; of equally near ones that of the lowest instance, then triangle.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut found = None;
-        self.batch::<_, _, false>(std::slice::from_ref(ray), All, |_, hit| found = hit);
-        found
+        let mut found = [None];
+        self.closest_hits(std::slice::from_ref(ray), &mut found, None);
+        found[0]
     }
 
     /// Whether there is any hit.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        let mut found = None;
-        self.batch::<_, _, true>(std::slice::from_ref(ray), All, |_, hit| found = hit);
-        found.is_some()
+        let mut found = [false];
+        self.any_hits(std::slice::from_ref(ray), &mut found, None);
+        found[0]
     }
 
     /// [`Tlas::closest_hit`] of each ray, among the hits that `accept`, if given, takes of the ray of that
@@ -169,7 +169,7 @@ impl Tlas {
     ///
     /// # Panics
     /// Unless there are as many `hits` as `rays`.
-    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>], accept: Option<&impl Accept>) {
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>], accept: Option<&dyn Accept>) {
         assert_eq!(rays.len(), hits.len());
         let report = |i: usize, hit| hits[i] = hit;
         match accept {
@@ -183,7 +183,7 @@ impl Tlas {
     ///
     /// # Panics
     /// Unless there are as many `blocked` as `rays`.
-    pub fn any_hits(&self, rays: &[Ray], blocked: &mut [bool], accept: Option<&impl Accept>) {
+    pub fn any_hits(&self, rays: &[Ray], blocked: &mut [bool], accept: Option<&dyn Accept>) {
         assert_eq!(rays.len(), blocked.len());
         let report = |i: usize, hit: Option<Hit>| blocked[i] = hit.is_some();
         match accept {

@@ -4,7 +4,7 @@ use super::{Entities, Redone, RenderOrigin};
 use crate::scene::color::luminance;
 use crate::scene::{GlobalTransform, Hidden, Light, Material, TriangleMesh, Visible, rotation};
 use crate::trace::light::FlatLight;
-use crate::trace::mesh_light::{MeshLight, triangle_area};
+use crate::trace::mesh_light::MeshLight;
 use crate::trace::quad::Quad;
 use crate::trace::scene::InstanceData;
 use crate::trace::shape_light::{Shape, ShapeLight};
@@ -46,14 +46,12 @@ pub fn sync_lights(
     let mut meshes = Vec::new();
     for (instance, data) in (0..).zip(&geometry.instances) {
         let placement = geometry.tlas.placements()[instance as usize].world_from_local();
-        for (slot, light) in mesh_lights(instance, data, placement, &surfaces) {
+        for (slot, light) in mesh_lights(instance, data, placement, &surfaces, &lights) {
             meshes.push(((instance, slot), flat.len() as u32));
             flat.push(FlatLight::Mesh(light));
         }
     }
-    let bounds = geometry.tlas.bounds();
-    let radius = if bounds.is_empty() { 1.0 } else { 0.5 * (bounds.max - bounds.min).length() };
-    *lights = Lights::new(flat, meshes, radius);
+    *lights = Lights::new(flat, meshes);
     redone.lights += 1;
 }
 
@@ -152,6 +150,7 @@ fn mesh_lights(
     data: &InstanceData,
     placed: &DAffine3,
     surfaces: &Surfaces,
+    before: &Lights,
 ) -> Vec<(u16, MeshLight)> {
     let surface = |slot: u16| {
         let number = data.materials.get(usize::from(slot)).copied().unwrap_or(0);
@@ -159,9 +158,14 @@ fn mesh_lights(
     };
     let slots = 0..data.materials.len().max(1) as u16;
     let emissive = slots.filter(|&slot| surface(slot).emission != Vec3::ZERO);
-    emissive
-        .filter_map(|slot| Some((slot, mesh_light(instance, &data.mesh, slot, placed, surface(slot))?)))
-        .collect()
+    let light = |slot: u16| {
+        let before = before.of_mesh(instance, slot).and_then(|light| match before.get(light) {
+            FlatLight::Mesh(light) => Some(light),
+            _ => None,
+        });
+        mesh_light(instance, &data.mesh, slot, placed, surface(slot), before)
+    };
+    emissive.filter_map(|slot| Some((slot, light(slot)?))).collect()
 }
 
 fn mesh_light(
@@ -170,34 +174,14 @@ fn mesh_light(
     slot: u16,
     placed: &DAffine3,
     material: &Material,
+    before: Option<&MeshLight>,
 ) -> Option<MeshLight> {
     let mirrored = placed.matrix3.determinant() < 0.0;
-    let mut light =
-        MeshLight { instance, two_sided: material.double_sided, mirrored, ..MeshLight::default() };
-    let mut areas = Vec::new();
-    for triangle in 0..mesh.triangles.len() {
-        if mesh.slot(triangle) != usize::from(slot) {
-            continue;
-        }
+    let own = (0..mesh.triangles.len()).filter(|&triangle| mesh.slot(triangle) == usize::from(slot));
+    let triangles = own.map(|triangle| {
         let corners = mesh.corners(triangle).map(|p| placed.transform_point3(p.as_dvec3()).as_vec3());
-        let area = triangle_area(&corners);
-        if area > 0.0 && area.is_finite() {
-            light.triangles.push(triangle as u32);
-            light.corners.push(corners);
-            areas.push(f64::from(area));
-        }
-    }
-    let total: f64 = areas.iter().sum();
-    let mut sum = 0.0;
-    light.cumulative = areas
-        .iter()
-        .map(|area| {
-            sum += area;
-            (sum / total) as f32
-        })
-        .collect();
-    *light.cumulative.last_mut()? = 1.0;
-    let sides = if light.two_sided { 2.0 } else { 1.0 };
-    light.power = std::f32::consts::PI * sides * luminance(material.emission) * total as f32;
-    Some(light)
+        (triangle as u32, corners)
+    });
+    let sides = [material.double_sided, mirrored];
+    MeshLight::new(instance, triangles, sides, luminance(material.emission), before)
 }

@@ -3,8 +3,10 @@
 use super::TraceScene;
 use super::bsdf::Bsdf;
 use super::camera::LENS;
-use super::integrator::{Batch, LIGHT, PAIRS_PER_BOUNCE, PICK, Path, Shadow};
+use super::connect::Shadow;
+use super::integrator::{Batch, LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
 use super::light::FlatLight;
+use super::light_tree::Receiver;
 use super::sampler::Sampler;
 use super::surface::Interaction;
 use crate::bvh::inspect::Order;
@@ -188,7 +190,8 @@ impl Explanation {
         for index in 0..scene.lights.picks(path.depth) {
             let by_chance = !scene.lights.samples_all(path.depth);
             let random = if by_chance { path.sampler.pair(base + PICK).x } else { 0.0 };
-            let light = scene.lights.pick(path.depth, index, random).light;
+            let to = Receiver { point: at.position, normal: bsdf.normal() };
+            let light = scene.lights.pick(path.depth, index, &to, random).light;
             let u = path.sampler.pair(base + LIGHT + 2 * index as u32);
             let sample = scene.lights.get(light).sample(at.position, bsdf.normal(), u);
             let row = self.row(scene, path.depth, light);

@@ -5,11 +5,13 @@
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
 use super::block::LANES;
-use super::bsdf::{Bsdf, Evaluated, Lobes};
+use super::bsdf::Lobes;
 use super::camera::Look;
+use super::connect::{Shadow, passed, power_heuristic};
 use super::diffuse::Diffuse;
 use super::film::Tile;
-use super::light::{FlatLight, LightSample};
+use super::light::FlatLight;
+use super::light_tree::Receiver;
 use super::pass::RayCounts;
 use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
@@ -44,18 +46,6 @@ pub(super) struct Bounce {
     pub(super) normal: Vec3,
     /// Lights that have been counted in full where it comes from, a bit for each.
     pub(super) counted: u32,
-}
-
-/// A ray toward a light, and what it brings if nothing is in the way.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Shadow {
-    pub(super) entry: u32,
-    pub(super) sampler: Sampler,
-    pub(super) ray: Ray,
-    pub(super) light: u32,
-    pub(super) triangle: Option<(u32, u32)>,
-    pub(super) contribution: Vec3,
-    pub(super) key: u32,
 }
 
 /// Which samples a tile is to get.
@@ -95,8 +85,8 @@ pub struct Batch {
     pub(super) reuse: Reuse,
     pub(super) rays: Vec<Ray>,
     pub(super) hits: Vec<Option<Hit>>,
-    ignored: Vec<Option<(u32, u32)>>,
-    blocked: Vec<bool>,
+    pub(super) ignored: Vec<Option<(u32, u32)>>,
+    pub(super) blocked: Vec<bool>,
     pub(super) radiance: Vec<Vec3>,
     /// Which of `pixels`, and which sample: all of one pixel, then of another.
     pub(super) keys: Vec<(u32, u32)>,
@@ -243,27 +233,6 @@ impl Batch {
         std::mem::swap(&mut self.paths, &mut self.next);
     }
 
-    /// Adds the light of those queued shadow rays that nothing blocks; returns how many were traced.
-    fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
-        self.shadows.retain(|shadow| !scene.lights.blocks(&shadow.ray, shadow.light));
-        // Rays to one light go similar ways. Stable: the sum of a path does not depend on its neighbours.
-        if scene.lights.len() > 1 {
-            self.shadows.sort_by_key(|shadow| shadow.light);
-        }
-        self.rays.clear();
-        self.rays.extend(self.shadows.iter().map(|shadow| shadow.ray));
-        self.ignored.clear();
-        self.ignored.extend(self.shadows.iter().map(|shadow| shadow.triangle));
-        self.blocked.resize(self.rays.len(), false);
-        let shadows = &self.shadows;
-        let random = |i: usize, key: u32| shadows[i].sampler.hashed(key, shadows[i].key);
-        scene.any_hits(&self.rays, &mut self.blocked, &self.ignored, random);
-        for (shadow, _) in self.shadows.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
-            self.radiance[shadow.entry as usize] += shadow.contribution;
-        }
-        self.shadows.len() as u64
-    }
-
     /// What the end of a path's ray sends back along it, and where it goes on.
     fn arrive(&mut self, scene: &TraceScene, index: usize) {
         let (mut path, hit) = (self.path(index), self.hits[index]);
@@ -314,7 +283,10 @@ impl Batch {
                     let distance2 = (at.position - path.ray.origin).length_squared();
                     let cos = at.geometric_normal.dot(path.ray.direction).abs();
                     let pdf = match scene.lights.get(light) {
-                        FlatLight::Mesh(mesh) => mesh.pdf(hit.triangle, path.ray.origin, distance2, cos),
+                        FlatLight::Mesh(mesh) => path.bounce.map_or(0.0, |bounce| {
+                            let from = Receiver { point: path.ray.origin, normal: bounce.normal };
+                            mesh.pdf(hit.triangle, &from, distance2, cos)
+                        }),
                         _ => 0.0,
                     };
                     self.collect(scene, path, light, emission, pdf);
@@ -333,7 +305,8 @@ impl Batch {
             if light < u32::BITS && bounce.counted >> light & 1 == 1 {
                 return 0.0;
             }
-            let light_pdf = pdf * scene.lights.chance(path.depth - 1, light);
+            let from = Receiver { point: path.ray.origin, normal: bounce.normal };
+            let light_pdf = pdf * scene.lights.chance(path.depth - 1, light, &from);
             power_heuristic(bounce.pdf, light_pdf)
         });
         self.radiance[path.entry as usize] += path.throughput * radiance * weight;
@@ -353,7 +326,8 @@ impl Batch {
                 let pair = index as u32 * 2;
                 let by_chance = !scene.lights.samples_all(path.depth);
                 let random = if by_chance { path.sampler.pair(base + PICK).x } else { 0.0 };
-                let pick = scene.lights.pick(path.depth, index, random);
+                let to = Receiver { point: at.position, normal: bsdf.normal() };
+                let pick = scene.lights.pick(path.depth, index, &to, random);
                 let u = path.sampler.pair(base + LIGHT + pair);
                 if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {
                     self.connect(scene, path, at, &bsdf, followed, pick.light, pick.chance, &sample);
@@ -400,84 +374,4 @@ impl Batch {
             absorption,
         });
     }
-
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "all of one vertex; a struct for one call would only rename them"
-    )]
-    fn connect(
-        &mut self,
-        scene: &TraceScene,
-        path: &Path,
-        at: &Interaction,
-        bsdf: &Bsdf,
-        followed: Lobes,
-        light: u32,
-        chance: f32,
-        sample: &LightSample,
-    ) {
-        let Evaluated { diffuse, glossy, pdf: bounce_pdf } = bsdf.evaluate(sample.wi, followed);
-        let weight = match sample.pdf {
-            None => (diffuse + glossy) / chance,
-            Some(pdf) => {
-                let light_pdf = pdf * chance;
-                let shared = power_heuristic(light_pdf, bounce_pdf);
-                // What no bounce would find is the light samples' alone.
-                (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
-            }
-        };
-        let mut contribution = path.throughput * weight * sample.radiance;
-        if let Some((instance, triangle)) = sample.triangle {
-            contribution *= mesh_emission(scene, instance, triangle, sample);
-        }
-        if path.absorption != Vec3::ZERO && at.geometric_normal.dot(sample.wi) > 0.0 {
-            let distance = sample.target.map_or(f32::MAX, |target| target.distance(at.position));
-            contribution *= passed(path.absorption, distance);
-        }
-        if contribution == Vec3::ZERO {
-            return;
-        }
-        let origin = at.lit_origin_toward(sample.wi);
-        let ray = match sample.target {
-            Some(target) => Ray { origin, direction: target - origin, t_max: 1.0 },
-            None => Ray::new(origin, sample.wi),
-        };
-        // A light nearer than rounding has no ray to it, and nothing fits between.
-        if ray.direction == Vec3::ZERO {
-            return;
-        }
-        self.shadows.push(Shadow {
-            entry: path.entry,
-            sampler: path.sampler,
-            ray,
-            light,
-            triangle: sample.triangle,
-            contribution,
-            key: light.wrapping_add(path.depth << 16).wrapping_add(1 << 31),
-        });
-    }
-}
-
-/// What is left after that way (J. H. Lambert, "Photometria", 1760; A. Beer, 1852).
-fn passed(absorption: Vec3, distance: f32) -> Vec3 {
-    (-absorption * distance).exp()
-}
-
-/// Radiance of an emissive triangle at a sampled point.
-pub(super) fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
-    let hit = Hit { t: 0.0, u: sample.uv.x, v: sample.uv.y, triangle, instance };
-    let (data, surface) = scene.surface_at(&hit);
-    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-    let corners = data.mesh.triangles[triangle as usize];
-    let uvs = super::scene::both_uvs(&data.mesh, corners, weights);
-    surface.material.emission * scene.texture(surface.emission_texture, uvs).truncate()
-}
-
-/// Weight of a sample of density `a` that might have been taken with density `b`.
-///
-/// Reference: E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2.2.
-pub(super) fn power_heuristic(a: f32, b: f32) -> f32 {
-    // As a ratio: squares of large densities overflow.
-    let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
 }

@@ -3,10 +3,12 @@
 //! All in render space. References: M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
 //! 4th ed., chapter 12 (area, cone and disc sampling).
 
+use super::light_tree::{Emitter, Receiver};
 use super::mesh_light::MeshLight;
 use super::shape_light::ShapeLight;
 use super::sky::SkyLight;
 use super::warp::{cone, cone_pdf, cosine_hemisphere, offset};
+use crate::bvh::Aabb;
 use crate::scene::Emission;
 use crate::scene::color::luminance;
 use glam::{Vec2, Vec3};
@@ -129,7 +131,7 @@ impl FlatLight {
                 Some(LightSample::new(wi, Some(position), strength * (sine * length / distance2), None))
             }
             Self::Shape(light) => light.sample(point, normal, u),
-            Self::Mesh(light) => light.sample(point, u),
+            Self::Mesh(light) => light.sample(&Receiver { point, normal }, u),
             Self::Sky(light) => light.sample(u),
             Self::Environment { radiance } => {
                 let local = cosine_hemisphere(u);
@@ -154,25 +156,22 @@ impl FlatLight {
         }
     }
 
-    /// A rough measure of emitted power (luminance of flux), to choose among many lights.
+    /// What a choice among many needs to know; `None` for a light beyond the scene.
     #[must_use]
-    pub fn power(&self, scene_radius: f32) -> f32 {
-        let disc = PI * scene_radius * scene_radius;
-        match self {
-            Self::Point { intensity, .. } => 4.0 * PI * luminance(*intensity),
-            Self::Spot { intensity, cos_outer, .. } => 2.0 * PI * (1.0 - cos_outer) * luminance(*intensity),
-            Self::Directional { irradiance, .. } => disc * luminance(*irradiance),
+    pub fn emitter(&self) -> Option<Emitter> {
+        let (bounds, intensity) = match self {
+            Self::Point { position, intensity } | Self::Spot { position, intensity, .. } => {
+                (Aabb::around(&[*position]), luminance(*intensity))
+            }
             Self::Segment { from, to, strength, .. } => {
-                PI * PI * from.distance(*to) * luminance((strength[0] + strength[1]) * 0.5)
+                let mean = luminance((strength[0] + strength[1]) * 0.5);
+                (Aabb::around(&[*from, *to]), mean * from.distance(*to))
             }
-            Self::Shape(light) => {
-                let mean = light.radiance.iter().sum::<Vec3>() * 0.25;
-                PI * light.shape.area() * luminance(mean)
-            }
-            Self::Mesh(light) => light.power,
-            Self::Sky(light) => PI * disc * light.mean_luminance(),
-            Self::Environment { radiance } => PI * disc * luminance(*radiance),
-        }
+            Self::Shape(light) => return Some(light.emitter()),
+            Self::Mesh(light) => return Some(light.emitter()),
+            Self::Directional { .. } | Self::Sky(_) | Self::Environment { .. } => return None,
+        };
+        Some(Emitter::all_round(bounds, intensity))
     }
 }
 

@@ -1,6 +1,7 @@
 //! All lights together: which to sample, and which a ray runs into.
 
 use super::light::FlatLight;
+use super::light_tree::{LightTree, Receiver};
 use super::shape_light::{ShapeHit, ShapeLight};
 use crate::bvh::{Aabb, Bvh, Probe, Ray, Shaft};
 use bevy_ecs::prelude::*;
@@ -10,9 +11,14 @@ use std::ops::ControlFlow;
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Lights {
     lights: Vec<FlatLight>,
-    /// Probability of choosing each when only one is sampled.
-    chances: Vec<f32>,
-    cumulative: Vec<f32>,
+    /// Over those that are somewhere, if ever only one is sampled.
+    tree: LightTree,
+    /// Their numbers in `lights`.
+    placed: Vec<u32>,
+    /// Of each light its place in `placed`; `u32::MAX` for others.
+    places: Vec<u32>,
+    /// Those that are nowhere: suns and skies.
+    unplaced: Vec<u32>,
     /// Solid shapes: a hierarchy over them and their numbers in `lights`.
     shapes: Bvh,
     shape_lights: Vec<u32>,
@@ -44,32 +50,30 @@ pub struct LightHit<'a> {
 
 /// Up to this many lights are all sampled where the eye looks; more are sampled by chance.
 pub const ALL_LIGHTS: usize = 8;
+/// So often one of many is chosen evenly: what they are expected to bring does not know what is in between.
+const EVENLY: f32 = 0.25;
 /// Up to this many solid lights are not worth a hierarchy.
 const FEW_SHAPES: usize = 4;
 
 impl Lights {
-    /// `meshes` names the light of each emissive (instance, slot); `scene_radius` is for the choice only.
+    /// `meshes` names the light of each emissive (instance, slot).
     #[must_use]
-    pub fn new(lights: Vec<FlatLight>, mut meshes: Vec<((u32, u16), u32)>, scene_radius: f32) -> Self {
+    pub fn new(lights: Vec<FlatLight>, mut meshes: Vec<((u32, u16), u32)>) -> Self {
         meshes.sort_unstable();
-        // A power beyond f32 counts as its largest number, and their sum as what it is.
-        let powers: Vec<f64> =
-            lights.iter().map(|l| f64::from(l.power(scene_radius).clamp(0.0, f32::MAX))).collect();
-        let total: f64 = powers.iter().sum();
-        // Half by power, half evenly: a faint near light must not be forgotten.
-        let even = 1.0 / lights.len().max(1) as f32;
-        let chances: Vec<f32> = powers
-            .iter()
-            .map(|p| if total > 0.0 { 0.5 * (p / total) as f32 + 0.5 * even } else { even })
-            .collect();
-        let mut sum = 0.0;
-        let cumulative = chances
-            .iter()
-            .map(|c| {
-                sum += c;
-                sum
-            })
-            .collect();
+        let (mut placed, mut unplaced) = (Vec::new(), Vec::new());
+        let (mut emitters, mut places) = (Vec::new(), vec![u32::MAX; lights.len()]);
+        if lights.len() > 1 {
+            for (i, light) in (0..).zip(&lights) {
+                if let Some(emitter) = light.emitter() {
+                    places[i as usize] = placed.len() as u32;
+                    placed.push(i);
+                    emitters.push(emitter);
+                } else {
+                    unplaced.push(i);
+                }
+            }
+        }
+        let tree = LightTree::new(&emitters);
         let numbered = || lights.iter().zip(0u32..);
         let solid: Vec<(u32, Aabb)> = numbered()
             .filter_map(|(l, i)| match l {
@@ -87,7 +91,7 @@ impl Lights {
             })
             .map(|(_, i)| i)
             .collect();
-        Self { chances, cumulative, shapes, shape_lights, beyond, meshes, lights }
+        Self { tree, placed, places, unplaced, shapes, shape_lights, beyond, meshes, lights }
     }
 
     /// Light number `index`.
@@ -116,18 +120,46 @@ impl Lights {
 
     /// Pick number `index` of [`Lights::picks`]; `random` in [0, 1) chooses if not all are taken.
     #[must_use]
-    pub fn pick(&self, depth: u32, index: usize, random: f32) -> Pick {
+    pub fn pick(&self, depth: u32, index: usize, to: &Receiver, random: f32) -> Pick {
         if self.samples_all(depth) {
             return Pick { light: index as u32, chance: 1.0 };
         }
-        let light = self.cumulative.partition_point(|&c| c <= random).min(self.lights.len() - 1);
-        Pick { light: light as u32, chance: self.chances[light] }
+        if random < EVENLY {
+            let light = (random / EVENLY * self.lights.len() as f32) as usize;
+            let light = light.min(self.lights.len() - 1) as u32;
+            return Pick { light, chance: self.chance(depth, light, to) };
+        }
+        let rest = (random - EVENLY) / (1.0 - EVENLY) * self.groups();
+        let last = self.lights.len() as u32 - 1;
+        let (light, among) = match (self.unplaced.get(rest as usize), self.tree.sample(to, rest.fract())) {
+            (Some(&light), _) => (light, 1.0),
+            (None, Some(chosen)) => (self.placed[chosen.emitter], chosen.chance),
+            (None, None) => (self.unplaced.last().copied().unwrap_or(last), 1.0),
+        };
+        Pick { light, chance: self.mixed(among) }
     }
 
     /// The [`Pick::chance`] of `light` after `depth` bounces.
     #[must_use]
-    pub fn chance(&self, depth: u32, light: u32) -> f32 {
-        if self.samples_all(depth) { 1.0 } else { self.chances[light as usize] }
+    pub fn chance(&self, depth: u32, light: u32, to: &Receiver) -> f32 {
+        if self.samples_all(depth) {
+            return 1.0;
+        }
+        let among = match self.places[light as usize] {
+            u32::MAX => 1.0,
+            place => self.tree.chance(to, place as usize),
+        };
+        self.mixed(among)
+    }
+
+    /// Suns and skies each, and all that is in the scene together, are chosen alike.
+    fn groups(&self) -> f32 {
+        self.unplaced.len() as f32 + if self.tree.is_empty() { 0.0 } else { 1.0 }
+    }
+
+    /// The chance of one that has this chance `among` its group, if it is chosen so.
+    fn mixed(&self, among: f32) -> f32 {
+        EVENLY / self.lights.len() as f32 + (1.0 - EVENLY) * among / self.groups()
     }
 
     /// Whether all lights are sampled at a vertex after `depth` bounces.

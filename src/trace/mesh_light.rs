@@ -1,36 +1,135 @@
 //! Emissive meshes: their triangles as one light.
 
 use super::light::{LightSample, sample_at, sample_flat};
+use super::light_tree::{Emitter, LightTree, Receiver};
 use super::spherical::{SphericalTriangle, meet, weights};
+use crate::bvh::Aabb;
 use glam::{Vec2, Vec3};
 
-/// Triangles of an emissive instance, chosen in proportion to their emitted power.
+/// Triangles of an emissive instance. A few are chosen by their area, many by what they may bring.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshLight {
     /// Index of the instance.
-    pub instance: u32,
-    /// Triangle numbers in the mesh.
-    pub triangles: Vec<u32>,
+    pub(crate) instance: u32,
+    /// Triangle numbers in the mesh, rising.
+    pub(crate) triangles: Vec<u32>,
     /// Corners in render space, beside `triangles`.
-    pub corners: Vec<[Vec3; 3]>,
-    /// Cumulative probability, beside `triangles`; the last is 1.
-    pub cumulative: Vec<f32>,
+    corners: Vec<[Vec3; 3]>,
+    /// Cumulative part of the area, beside `triangles`; the last is 1.
+    pub(crate) cumulative: Vec<f32>,
+    /// Empty for a few.
+    tree: LightTree,
     /// Emits on the back too.
-    pub two_sided: bool,
+    pub(crate) two_sided: bool,
     /// The placement mirrors: the front is where `corners` run clockwise.
-    pub mirrored: bool,
-    /// Luminance of the radiant exitance summed over the area, W.
-    pub power: f32,
+    pub(crate) mirrored: bool,
+    emitter: Emitter,
 }
 
+/// Up to this many are chosen by their area alone.
+const FEW: usize = 4;
+/// So often one of many is chosen by its area: what it is expected to bring does not know what is in between.
+const BY_AREA: f32 = 0.25;
+
 impl MeshLight {
-    /// A direction toward it from `point`; see [`super::light::FlatLight::sample`].
-    pub(super) fn sample(&self, point: Vec3, u: Vec2) -> Option<LightSample> {
-        let i = self.cumulative.partition_point(|&c| c <= u.x).min(self.cumulative.len() - 1);
+    /// Of the triangles of an instance (numbers in its mesh, rising, and corners in render space) that shine with
+    /// this luminance; those without area are left out. `None` if nothing is left. `before` is a light that it may
+    /// be again.
+    #[must_use]
+    pub fn new(
+        instance: u32,
+        triangles: impl Iterator<Item = (u32, [Vec3; 3])>,
+        [two_sided, mirrored]: [bool; 2],
+        luminance: f32,
+        before: Option<&Self>,
+    ) -> Option<Self> {
+        let mut areas = Vec::new();
+        let mut light = Self { instance, two_sided, mirrored, ..Self::default() };
+        for (triangle, corners) in triangles {
+            let area = triangle_area(&corners);
+            if area > 0.0 && area.is_finite() {
+                light.triangles.push(triangle);
+                light.corners.push(corners);
+                areas.push(area);
+            }
+        }
+        let total: f64 = areas.iter().map(|area| f64::from(*area)).sum();
+        let mut sum = 0.0;
+        light.cumulative.extend(areas.iter().map(|area| {
+            sum += f64::from(*area);
+            (sum / total) as f32
+        }));
+        *light.cumulative.last_mut()? = 1.0;
+        let emitters = || {
+            light.corners.iter().zip(&areas).map(|(corners, area)| {
+                Emitter::flat(Aabb::around(corners), light.front(corners), two_sided, *area)
+            })
+        };
+        let all = emitters().reduce(|all, more| all.union(&more))?;
+        let emitter = Emitter { intensity: luminance * total as f32, ..all };
+        if light.corners.len() > FEW {
+            let same = |before: &&Self| {
+                before.corners == light.corners
+                    && [before.two_sided, before.mirrored] == [two_sided, mirrored]
+            };
+            light.tree = match before.filter(same) {
+                Some(before) => before.tree.clone(),
+                None => LightTree::new(&emitters().collect::<Vec<_>>()),
+            };
+        }
+        light.emitter = emitter;
+        Some(light)
+    }
+
+    pub(super) fn emitter(&self) -> Emitter {
+        self.emitter
+    }
+
+    /// Unit normal of the side that shines; zero where it has none.
+    fn front(&self, [a, b, c]: &[Vec3; 3]) -> Vec3 {
+        let normal = (*b - *a).cross(*c - *a).normalize_or_zero();
+        if self.mirrored { -normal } else { normal }
+    }
+
+    /// Part of the area that number `i` has.
+    fn part(&self, i: usize) -> f32 {
+        self.cumulative[i] - if i == 0 { 0.0 } else { self.cumulative[i - 1] }
+    }
+
+    /// Chooses a triangle by its area; what is left of the random number is a fresh one.
+    fn by_area(&self, random: f32) -> (usize, f32) {
+        let i = self.cumulative.partition_point(|&c| c <= random).min(self.cumulative.len() - 1);
         let below = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
-        let share = self.cumulative[i] - below;
-        // What is left of u.x within this triangle's share is a fresh number.
-        let rest = ((u.x - below) / share).clamp(0.0, 1.0);
+        (i, ((random - below) / self.part(i)).clamp(0.0, 1.0))
+    }
+
+    /// Chooses a triangle: which, the probability of that, and what is left of the random number.
+    fn choose(&self, to: &Receiver, random: f32) -> (usize, f32, f32) {
+        if random < BY_AREA || self.tree.is_empty() {
+            let (i, rest) = self.by_area(if self.tree.is_empty() { random } else { random / BY_AREA });
+            return (i, self.chance(to, i), rest);
+        }
+        match self.tree.sample(to, (random - BY_AREA) / (1.0 - BY_AREA)) {
+            Some(chosen) => {
+                let i = chosen.emitter;
+                (i, BY_AREA * self.part(i) + (1.0 - BY_AREA) * chosen.chance, chosen.rest)
+            }
+            None => (0, self.chance(to, 0), 0.0),
+        }
+    }
+
+    /// Probability of choosing number `i`.
+    fn chance(&self, to: &Receiver, i: usize) -> f32 {
+        if self.tree.is_empty() {
+            return self.part(i);
+        }
+        BY_AREA * self.part(i) + (1.0 - BY_AREA) * self.tree.chance(to, i)
+    }
+
+    /// A direction toward it; see [`super::light::FlatLight::sample`].
+    pub(super) fn sample(&self, to: &Receiver, u: Vec2) -> Option<LightSample> {
+        let point = to.point;
+        let (i, share, rest) = self.choose(to, u.x);
         let corners = &self.corners[i];
         let [a, b, c] = *corners;
         let at = |[b1, b2]: [f32; 2]| a * (1.0 - b1 - b2) + b * b1 + c * b2;
@@ -56,13 +155,13 @@ impl MeshLight {
         })
     }
 
-    /// Density in solid angle of sampling `triangle` from `point` at this distance and cosine at the light.
+    /// Density in solid angle of sampling `triangle` for a point at this distance and cosine at the light.
     #[must_use]
-    pub fn pdf(&self, triangle: u32, point: Vec3, distance2: f32, cos: f32) -> f32 {
+    pub fn pdf(&self, triangle: u32, to: &Receiver, distance2: f32, cos: f32) -> f32 {
         let Ok(i) = self.triangles.binary_search(&triangle) else { return 0.0 };
-        let share = self.cumulative[i] - if i == 0 { 0.0 } else { self.cumulative[i - 1] };
-        if is_near(&self.corners[i], point) {
-            return seen_from(&self.corners[i], point)
+        let share = self.chance(to, i);
+        if is_near(&self.corners[i], to.point) {
+            return seen_from(&self.corners[i], to.point)
                 .map_or(0.0, |seen| (f64::from(share) / seen.solid_angle) as f32);
         }
         share * distance2 / (triangle_area(&self.corners[i]) * cos.max(1e-9))

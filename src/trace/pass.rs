@@ -48,7 +48,7 @@ pub fn trace_adaptive(
     let rays = trace_pass(scene, film, until.min(allot::EVEN), step, keep_going);
     if film.complete_samples() == allot::EVEN {
         let mut shares = allot::shares(film);
-        if reuse::is_on(scene) {
+        if scene.settings.shares_paths() {
             reuse::even_out(&mut shares, film.size().x as usize);
         }
         film.allot(&shares);

@@ -167,7 +167,8 @@ impl<'a> TraceScene<'a> {
     ) {
         let covering = Covering { scene: self, ignored: &[], random };
         let asked = self.coverage.alpha.contains(&true);
-        self.geometry.tlas.closest_hits(rays, hits, asked.then_some(&covering));
+        let covering: &dyn Accept = &covering;
+        self.geometry.tlas.closest_hits(rays, hits, asked.then_some(covering));
     }
 
     /// For each ray whether something is there, not counting the triangle `ignored` of it, (instance,
@@ -181,7 +182,8 @@ impl<'a> TraceScene<'a> {
     ) {
         let asked = self.coverage.alpha.contains(&true) || ignored.iter().any(Option::is_some);
         let covering = Covering { scene: self, ignored, random };
-        self.geometry.tlas.any_hits(rays, blocked, asked.then_some(&covering));
+        let covering: &dyn Accept = &covering;
+        self.geometry.tlas.any_hits(rays, blocked, asked.then_some(covering));
     }
 
     fn covers(&self, hit: &Hit, random: impl Fn(u32) -> f32) -> bool {

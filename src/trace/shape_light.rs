@@ -1,10 +1,12 @@
 //! Area lights with a shape of their own: sampled like all lights, and solid to rays.
 
 use super::light::{LightSample, error_of, sample_at, sample_flat};
+use super::light_tree::Emitter;
 use super::quad::Quad;
 use super::spherical::{SphericalQuad, meet, weights};
 use super::warp::{cone, cone_pdf, offset, uniform_sphere};
 use crate::bvh::{Aabb, Ray};
+use crate::scene::color::luminance;
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -66,6 +68,17 @@ impl ShapeLight {
         let reach = bounds.min.abs().max(bounds.max.abs()).element_sum();
         let (normal, area) = (shape.normal(), shape.area());
         Self { shape, radiance, two_sided, visible, normal, area, reach }
+    }
+
+    /// What a choice among many needs to know.
+    pub(super) fn emitter(&self) -> Emitter {
+        let mean = luminance(self.radiance.iter().sum::<Vec3>() * 0.25);
+        let (bounds, intensity) = (self.shape.bounds(), mean * self.area);
+        match &self.shape {
+            // As large as it looks from anywhere.
+            Shape::Sphere { .. } => Emitter::all_round(bounds, intensity * 0.25),
+            _ => Emitter::flat(bounds, self.normal, self.two_sided, intensity),
+        }
     }
 
     /// A direction toward it from `point` with `normal`; see [`super::light::FlatLight::sample`].

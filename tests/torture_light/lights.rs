@@ -7,10 +7,10 @@ use penumbra::torture::light::meter::{Ask, Meter, Plan, Reading, measure, ours};
 use penumbra::torture::light::oracle;
 use penumbra::torture::light::pictures::fireflies;
 use penumbra::torture::light::remedies::{choice, densities, solid_angles};
-use penumbra::torture::light::rng::Rng;
 use penumbra::torture::light::rooms::{awkward_places, judge_form_factor, squares};
 use penumbra::torture::light::shadows::penumbra;
 use penumbra::torture::light::spot::{Expected, Spot, Thing};
+use penumbra::torture::oracle::Rng;
 use penumbra::torture::{Check, Place};
 
 fn judged(spots: &[Spot], meter: &Meter) -> Vec<Check> {

@@ -3,6 +3,7 @@
 use crate::finds;
 use glam::Vec2;
 use penumbra::torture::Check;
+use penumbra::torture::light::lamps::quads;
 use penumbra::torture::light::meter::{Ask, ours};
 use penumbra::torture::light::numbers::{below_one, neighbours, net, over_seeds, unbiased};
 use penumbra::torture::light::pictures::{
@@ -11,7 +12,7 @@ use penumbra::torture::light::pictures::{
 use penumbra::torture::light::shadows::penumbra;
 use penumbra::torture::light::slopes::{Slope, errors, judge_long_run, judge_slope};
 use penumbra::torture::light::sums::{Accumulator, a_day, adding, poison};
-use penumbra::torture::light::{lamps::quads, rng::Rng};
+use penumbra::torture::oracle::Rng;
 use penumbra::torture::stage::reds;
 use penumbra::trace::allot::EVEN;
 use penumbra::trace::sampler::{Sampler, hash, unit_float};

@@ -1,7 +1,7 @@
 //! A sampler against the density that it claims.
 
-use super::rng::Rng;
 use crate::torture::Check;
+use crate::torture::oracle::Rng;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 

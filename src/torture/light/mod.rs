@@ -11,7 +11,6 @@ pub mod numbers;
 pub mod oracle;
 pub mod pictures;
 pub mod remedies;
-pub mod rng;
 pub mod rooms;
 pub mod shading;
 pub mod shadows;

@@ -2,10 +2,10 @@
 
 use super::meter::{larger, no_light, places};
 use super::pictures::differing;
-use super::rng::Rng;
 use crate::scene::{
     Encoding, Filter, Glossy, Light, Material, NormalMap, Texels, Texture, TriangleMesh, Wrap,
 };
+use crate::torture::oracle::Rng;
 use crate::torture::stage::{Stage, ball, cube, quad, reds, settings};
 use crate::torture::{Case, Check, Place, Trial};
 use crate::trace::Integrator;

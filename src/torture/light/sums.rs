@@ -1,11 +1,11 @@
 //! S5, S8, S10: what adds samples up, for as long as anybody likes.
 
 use super::meter::no_light;
-use super::rng::Rng;
 use crate::app::FrameBudget;
 use crate::load::{LoadOptions, SceneSource, built_in_scenes};
 use crate::open::{Wishes, open};
 use crate::scene::Light;
+use crate::torture::oracle::Rng;
 use crate::torture::stage::{Stage, quad, reds, settings};
 use crate::torture::{Case, Check, Trial};
 use crate::trace::film::Pixel;

@@ -3,8 +3,8 @@
 use super::chi_square::{Draws, Map, compare};
 use super::kinds::{Seen, coat, ggx, glossy_kinds, layered, layered_kinds};
 use super::meter::larger;
-use super::rng::Rng;
 use crate::scene::{Glossy, Layers, Material};
+use crate::torture::oracle::Rng;
 use crate::torture::{Case, Check, Trial};
 use crate::trace::bsdf::Lobes;
 use crate::trace::bsdf::normal::clear_of_surface;

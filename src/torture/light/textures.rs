@@ -1,9 +1,9 @@
 //! H5, H6, H12: texture coordinates, decoding, tone maps.
 
-use super::rng::Rng;
 use crate::image::develop::{Display, develop};
 use crate::image::tone_map::ToneMap;
 use crate::scene::{Encoding, Filter, Texels, Texture, Wrap};
+use crate::torture::oracle::Rng;
 use crate::torture::{Case, Check, Trial};
 use crate::trace::Film;
 use crate::trace::texture::lookup;

@@ -54,11 +54,11 @@ impl Tracer for Tlas {
     }
 
     fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        Self::closest_hits(self, rays, hits, None::<&fn(usize, &Hit) -> bool>);
+        Self::closest_hits(self, rays, hits, None);
     }
 
     fn any_hits(&self, rays: &[Ray], blocked: &mut [bool]) {
-        Self::any_hits(self, rays, blocked, None::<&fn(usize, &Hit) -> bool>);
+        Self::any_hits(self, rays, blocked, None);
     }
 }
 

@@ -80,7 +80,12 @@ impl Lanes {
                 continue;
             }
             rays.push(ray);
-            ways.push(Way { entry: self.entry[m], density: self.density[m] });
+            ways.push(Way {
+                entry: self.entry[m],
+                member: m as u32,
+                owner: self.entry[own],
+                density: self.density[m],
+            });
         }
         (ways.len() - before) as u32
     }

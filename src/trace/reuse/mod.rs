@@ -4,6 +4,8 @@
 //! that y sends back, found once, is weighted among all members that see y, by how likely each would have come there
 //! itself: n paths cost little more than n shadow rays each, and every pixel has n of them. No weight exceeds 1, and
 //! those of a path add up to 1: nothing is biased, and no pixel gets more from a path than whoever found it would have.
+//! That holds too where something half-transparent is between them: who sees y is then a matter of chance, drawn for
+//! each way by itself, and whoever found y is one who did see it.
 //!
 //! Reference: P. Bekaert, M. Sbert, J. Halton, "Accelerating Path Tracing by Re-Using Paths", Eurographics Workshop on
 //! Rendering 2002; the weights are E. Veach's balance heuristic.
@@ -25,6 +27,8 @@ use glam::{UVec2, Vec3};
 use group::{GROUPS, Groups, MEMBERS};
 use lanes::Lanes;
 
+/// Marks the random numbers of ways to neighbours' ends, apart from those of bounces and shadows.
+const WAY: u32 = 1 << 30;
 /// Rays between neighbours that are traced together.
 const RAYS: usize = 4096;
 
@@ -97,6 +101,10 @@ struct Queue {
 #[derive(Clone, Copy, Debug)]
 struct Way {
     entry: u32,
+    /// Whose member of its group that is.
+    member: u32,
+    /// Whose end it is.
+    owner: u32,
     /// Of going there, by area times π.
     density: f32,
 }
@@ -109,17 +117,10 @@ struct Shared {
     ways: u32,
 }
 
-/// Whether pictures of this scene are made so. Not where something is half-transparent: each way through it would need
-/// random numbers of its own, and a difference of 4 % from paths alone, once measured there, is not yet explained by a
-/// test (crossings that shared a number, since mended, are the likely cause).
-pub(super) fn is_on(scene: &TraceScene) -> bool {
-    scene.settings.shares_paths() && !scene.coverage.alpha.contains(&true)
-}
-
 impl Reuse {
     /// Begins with another batch, of a tile of this size.
     pub(super) fn enter(&mut self, scene: &TraceScene, size: UVec2) {
-        self.on = is_on(scene);
+        self.on = scene.settings.shares_paths();
         if self.on {
             self.groups.of(size);
             self.sets.clear();
@@ -213,8 +214,12 @@ impl Batch {
     /// The random numbers of an entry's path beyond its own point: those of its group together are as even as those
     /// of one pixel.
     pub(super) fn shared_sampler(&self, entry: u32) -> Sampler {
+        self.sampler_in(&self.reuse.groups, entry)
+    }
+
+    fn sampler_in(&self, groups: &Groups, entry: u32) -> Sampler {
         let (pixel, sample) = self.keys[entry as usize];
-        let (leader, rank) = self.reuse.groups.ranks[pixel as usize];
+        let (leader, rank) = groups.ranks[pixel as usize];
         self.pixels[leader as usize].1[sample as usize & 1].at(sample).shared(rank, MEMBERS as u32)
     }
 
@@ -236,22 +241,30 @@ impl Batch {
                     }
                 }
                 if reuse.queue.rays.len() > RAYS - MEMBERS * MEMBERS {
-                    rays += self.give(scene, &reuse.starts, &mut reuse.queue);
+                    rays += self.give(scene, &reuse.groups, &reuse.starts, &mut reuse.queue);
                 }
             }
         }
-        rays += self.give(scene, &reuse.starts, &mut reuse.queue);
+        rays += self.give(scene, &reuse.groups, &reuse.starts, &mut reuse.queue);
         self.reuse = reuse;
         rays
     }
 
     /// Gives what the queued ends send back to all who see them.
-    fn give(&mut self, scene: &TraceScene, starts: &[Option<Start>], queue: &mut Queue) -> u64 {
+    fn give(
+        &mut self,
+        scene: &TraceScene,
+        groups: &Groups,
+        starts: &[Option<Start>],
+        queue: &mut Queue,
+    ) -> u64 {
         let Queue { shared, ways, rays, blocked } = queue;
         blocked.clear();
         blocked.resize(rays.len(), false);
-        // Nothing is half-transparent.
-        scene.any_hits(rays, blocked, &[], |_, _| 0.0);
+        scene.any_hits(rays, blocked, &[], |i, key| {
+            let way = &ways[i];
+            self.sampler_in(groups, way.owner).hashed(key, WAY | way.member)
+        });
         let mut first = 0;
         for end in shared.iter() {
             let range = first..first + end.ways as usize;

@@ -1,0 +1,126 @@
+//! Rays toward lights: what light samples bring, if nothing is in the way.
+
+use super::TraceScene;
+use super::bsdf::{Bsdf, Evaluated, Lobes};
+use super::integrator::{Batch, Path};
+use super::light::LightSample;
+use super::sampler::Sampler;
+use super::surface::Interaction;
+use crate::bvh::{Hit, Ray};
+use glam::Vec3;
+
+/// A ray toward a light, and what it brings if nothing is in the way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shadow {
+    pub(super) entry: u32,
+    pub(super) sampler: Sampler,
+    pub(super) ray: Ray,
+    pub(super) light: u32,
+    pub(super) triangle: Option<(u32, u32)>,
+    pub(super) contribution: Vec3,
+    pub(super) key: u32,
+}
+
+impl Batch {
+    /// Adds the light of those queued shadow rays that nothing blocks; returns how many were traced.
+    pub(super) fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
+        self.shadows.retain(|shadow| !scene.lights.blocks(&shadow.ray, shadow.light));
+        // Rays to one light go similar ways. Stable: the sum of a path does not depend on its neighbours.
+        if scene.lights.len() > 1 {
+            self.shadows.sort_by_key(|shadow| shadow.light);
+        }
+        self.rays.clear();
+        self.rays.extend(self.shadows.iter().map(|shadow| shadow.ray));
+        self.ignored.clear();
+        self.ignored.extend(self.shadows.iter().map(|shadow| shadow.triangle));
+        self.blocked.resize(self.rays.len(), false);
+        let shadows = &self.shadows;
+        let random = |i: usize, key: u32| shadows[i].sampler.hashed(key, shadows[i].key);
+        scene.any_hits(&self.rays, &mut self.blocked, &self.ignored, random);
+        for (shadow, _) in self.shadows.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
+            self.radiance[shadow.entry as usize] += shadow.contribution;
+        }
+        self.shadows.len() as u64
+    }
+
+    /// Queues the ray to a light sample.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all of one vertex; a struct for one call would only rename them"
+    )]
+    pub(super) fn connect(
+        &mut self,
+        scene: &TraceScene,
+        path: &Path,
+        at: &Interaction,
+        bsdf: &Bsdf,
+        followed: Lobes,
+        light: u32,
+        chance: f32,
+        sample: &LightSample,
+    ) {
+        let Evaluated { diffuse, glossy, pdf: bounce_pdf } = bsdf.evaluate(sample.wi, followed);
+        let weight = match sample.pdf {
+            None => (diffuse + glossy) / chance,
+            Some(pdf) => {
+                let light_pdf = pdf * chance;
+                let shared = power_heuristic(light_pdf, bounce_pdf);
+                // What no bounce would find is the light samples' alone.
+                (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
+            }
+        };
+        let mut contribution = path.throughput * weight * sample.radiance;
+        if let Some((instance, triangle)) = sample.triangle {
+            contribution *= mesh_emission(scene, instance, triangle, sample);
+        }
+        if path.absorption != Vec3::ZERO && at.geometric_normal.dot(sample.wi) > 0.0 {
+            let distance = sample.target.map_or(f32::MAX, |target| target.distance(at.position));
+            contribution *= passed(path.absorption, distance);
+        }
+        if contribution == Vec3::ZERO {
+            return;
+        }
+        let origin = at.lit_origin_toward(sample.wi);
+        let ray = match sample.target {
+            Some(target) => Ray { origin, direction: target - origin, t_max: 1.0 },
+            None => Ray::new(origin, sample.wi),
+        };
+        // A light nearer than rounding has no ray to it, and nothing fits between.
+        if ray.direction == Vec3::ZERO {
+            return;
+        }
+        self.shadows.push(Shadow {
+            entry: path.entry,
+            sampler: path.sampler,
+            ray,
+            light,
+            triangle: sample.triangle,
+            contribution,
+            key: light.wrapping_add(path.depth << 16).wrapping_add(1 << 31),
+        });
+    }
+}
+
+/// What is left after that way (J. H. Lambert, "Photometria", 1760; A. Beer, 1852).
+pub(super) fn passed(absorption: Vec3, distance: f32) -> Vec3 {
+    (-absorption * distance).exp()
+}
+
+/// Radiance of an emissive triangle at a sampled point.
+pub(super) fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sample: &LightSample) -> Vec3 {
+    let hit = Hit { t: 0.0, u: sample.uv.x, v: sample.uv.y, triangle, instance };
+    let (data, surface) = scene.surface_at(&hit);
+    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+    let corners = data.mesh.triangles[triangle as usize];
+    let uvs = super::scene::both_uvs(&data.mesh, corners, weights);
+    surface.material.emission * scene.texture(surface.emission_texture, uvs).truncate()
+}
+
+/// Weight of a sample of density `a` that might have been taken with density `b`.
+///
+/// Reference: E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2.2.
+pub(super) fn power_heuristic(a: f32, b: f32) -> f32 {
+    // As a ratio: squares of large densities overflow.
+    let ratio = b / a;
+    1.0 / (1.0 + ratio * ratio)
+}

@@ -1,0 +1,65 @@
+//! A square of the film.
+
+use super::pixel::{EMPTY, Pixel};
+use crate::trace::sightlines::Sightlines;
+use glam::UVec2;
+
+/// A square of the film that one thread works on at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    /// Its top left pixel.
+    pub origin: UVec2,
+    /// Its size: [`TILE`] except at the right and lower border.
+    pub size: UVec2,
+    /// Index of the sample that comes next in each of its pixels, but for `more`.
+    pub next_sample: u32,
+    /// Samples beyond `next_sample` that each pixel has, in rows from the top. Empty before [`Film::allot`].
+    pub(in crate::trace) more: Vec<u32>,
+    /// How many each gets for each one that the picture gets on average; as many.
+    pub(super) shares: Vec<f32>,
+    /// Samples per pixel of the picture that all have their share of, if they have shares.
+    pub(in crate::trace) complete: u32,
+    /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
+    pub dropped: u64,
+    /// It gets no samples for now.
+    pub(super) rests: bool,
+    /// What the pixels hold is from before the last reset.
+    pub(super) stale: bool,
+    /// What is known of its part of the scene until the next reset.
+    pub(in crate::trace) sightlines: Sightlines,
+    pub(super) pixels: Vec<Pixel>,
+}
+
+impl Tile {
+    /// Whether it gets no samples for now: see [`Film::confine`].
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.rests
+    }
+
+    /// What [`Tile::more`] is to be of a pixel when it has its share of `beyond` samples.
+    #[must_use]
+    pub(in crate::trace) fn goal(&self, pixel: usize, beyond: u32) -> u32 {
+        // Saturates; and sample indices end with u32.
+        ((f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32).min(u32::MAX - self.next_sample)
+    }
+
+    /// Index of the sample that comes next in a pixel: what is missing below it was dropped.
+    #[must_use]
+    pub fn next_of(&self, pixel: usize) -> u32 {
+        self.next_sample + self.more.get(pixel).copied().unwrap_or(0)
+    }
+
+    /// Rows from the top, to look at.
+    pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
+        self.pixels.iter().map(|pixel| if self.stale { &EMPTY } else { pixel })
+    }
+
+    /// Rows from the top.
+    pub fn pixels_mut(&mut self) -> &mut [Pixel] {
+        if std::mem::take(&mut self.stale) {
+            self.pixels.fill(Pixel::default());
+        }
+        &mut self.pixels
+    }
+}

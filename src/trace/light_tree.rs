@@ -1,0 +1,407 @@
+//! Which of many emitters to sample at a point: a hierarchy over them, descended by how much each half may bring.
+//!
+//! Every node knows a box and a cone of normals around its emitters and their intensity; from these follows what
+//! they could bring to a point at most, nearly. The way down is chosen in proportion, so that the cost grows with
+//! the logarithm of their number.
+//!
+//! Reference: A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proc. ACM
+//! Computer Graphics and Interactive Techniques 1(2), 2018.
+
+use crate::bvh::Aabb;
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// Where light is to arrive.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// In render space.
+    pub point: Vec3,
+    /// Unit normal of the shaded side.
+    pub normal: Vec3,
+}
+
+/// Something that shines, as far as the choice needs to know it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Emitter {
+    /// Around it.
+    pub bounds: Aabb,
+    /// Middle of its normals; zero: they have no direction in common.
+    pub axis: Vec3,
+    /// Largest angle between a normal and `axis`; it shines up to a right angle beyond.
+    pub spread: f32,
+    /// Luminance of the intensity along a normal, W/sr.
+    pub intensity: f32,
+}
+
+impl Emitter {
+    /// Shines to all sides.
+    #[must_use]
+    pub fn all_round(bounds: Aabb, intensity: f32) -> Self {
+        Self { bounds, axis: Vec3::ZERO, spread: PI, intensity }
+    }
+
+    /// Flat; its back is dark if it is not `two_sided`.
+    #[must_use]
+    pub fn flat(bounds: Aabb, normal: Vec3, two_sided: bool, intensity: f32) -> Self {
+        if two_sided {
+            Self::all_round(bounds, intensity)
+        } else {
+            Self { bounds, axis: normal, spread: 0.0, intensity }
+        }
+    }
+
+    /// Both together.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        let (axis, spread) = around_both((self.axis, self.spread), (other.axis, other.spread));
+        let intensity = self.intensity + other.intensity;
+        Self { bounds: self.bounds.union(other.bounds), axis, spread, intensity }
+    }
+
+    /// What a split is judged by: the chance that it is of use to some point.
+    fn cost(&self) -> f32 {
+        let size = (self.bounds.max - self.bounds.min).max(Vec3::ZERO);
+        // Directions that it shines to, weighted by cosine: the integral of the reference's equation 1 for emission up to
+        // a right angle.
+        let (spread, reach) = (self.spread, (self.spread + FRAC_PI_2).min(PI));
+        let (sin, cos) = spread.sin_cos();
+        let directions = 2.0 * PI * (1.0 - cos)
+            + FRAC_PI_2 * (2.0 * reach * sin - (spread - 2.0 * reach).cos() - 2.0 * spread * sin + cos);
+        // Also what has no area takes room.
+        let room = Aabb { min: Vec3::ZERO, max: size }.half_area() + size.length_squared();
+        self.intensity * room * directions
+    }
+}
+
+/// The smallest cone around two; see the reference, algorithm 1.
+fn around_both(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
+    let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    if wide.1 >= PI {
+        return (Vec3::ZERO, PI);
+    }
+    let between = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
+    if (between + narrow.1).min(PI) <= wide.1 {
+        return wide;
+    }
+    // Rounded up: no normal may be left out.
+    let spread = 0.5 * (wide.1 + between + narrow.1) + 1e-5;
+    let turn = spread - wide.1;
+    match (narrow.0 - wide.0 * wide.0.dot(narrow.0)).try_normalize() {
+        Some(aside) if spread < PI => ((wide.0 * turn.cos() + aside * turn.sin()).normalize(), spread),
+        _ => (Vec3::ZERO, PI),
+    }
+}
+
+/// One that was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chosen {
+    /// Its number.
+    pub emitter: usize,
+    /// Probability of that.
+    pub chance: f32,
+    /// What is left of the random number: a fresh one.
+    pub rest: f32,
+}
+
+/// What the way down needs of emitters together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Node {
+    /// Of the ball around their box.
+    center: Vec3,
+    radius2: f32,
+    axis: Vec3,
+    cos_spread: f32,
+    sin_spread: f32,
+    intensity: f32,
+    /// First of two children, or, in a leaf, which emitter.
+    child: u32,
+    is_leaf: bool,
+}
+
+impl Node {
+    fn new(all: &Emitter, child: usize, is_leaf: bool) -> Self {
+        let half = (all.bounds.max - all.bounds.min) * 0.5;
+        let (sin_spread, cos_spread) = all.spread.sin_cos();
+        Self {
+            center: all.bounds.center(),
+            radius2: half.length_squared(),
+            axis: all.axis,
+            cos_spread,
+            sin_spread,
+            intensity: all.intensity,
+            child: child as u32,
+            is_leaf,
+        }
+    }
+
+    /// What they could bring to a point if nothing is in between; bounds of angles, but the distance of their middle.
+    fn importance(&self, to: &Receiver) -> f32 {
+        let along = self.center - to.point;
+        let distance2 = along.length_squared();
+        // From inside of the ball around them, they may be anywhere.
+        let (mut leaves, mut arrives) = (1.0, 1.0);
+        if distance2 > self.radius2 {
+            let toward = along / distance2.sqrt();
+            let sin2 = self.radius2 / distance2;
+            let size = [sin2.sqrt(), (1.0 - sin2).sqrt()];
+            let beyond = without(angle(-self.axis.dot(toward)), [self.sin_spread, self.cos_spread]);
+            leaves = without(beyond, size)[1];
+            arrives = without(angle(to.normal.dot(toward)), size)[1];
+        }
+        // Never quite dark: what shines through a surface arrives from behind, and rounding must not decide.
+        self.intensity * leaves.max(0.01) * arrives.max(0.05)
+            / distance2.max(self.radius2).max(f32::MIN_POSITIVE)
+    }
+}
+
+/// Sine and cosine of an angle up to π, of its cosine.
+fn angle(cos: f32) -> [f32; 2] {
+    let cos = cos.clamp(-1.0, 1.0);
+    [(1.0 - cos * cos).sqrt(), cos]
+}
+
+/// Of the first angle without the second; of 0 if it is the smaller one.
+fn without([sin_a, cos_a]: [f32; 2], [sin_b, cos_b]: [f32; 2]) -> [f32; 2] {
+    if cos_a >= cos_b {
+        return [0.0, 1.0];
+    }
+    [sin_a * cos_b - cos_a * sin_b, cos_a * cos_b + sin_a * sin_b]
+}
+
+/// A hierarchy over emitters.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LightTree {
+    nodes: Vec<Node>,
+    /// The way to each emitter from the root: a bit for each node, the first lowest.
+    ways: Vec<u64>,
+}
+
+/// Planes that are tried along each axis.
+const BINS: usize = 12;
+/// Of more emitters so many judge for all.
+const JUDGED: usize = 1024;
+/// From this depth on nodes are halved by number, so that a way has at most 64 bits.
+const DEEP: u32 = 30;
+
+impl LightTree {
+    /// Over these; those that bring nothing are chosen with those beside them, if ever.
+    #[must_use]
+    pub fn new(emitters: &[Emitter]) -> Self {
+        let mut tree = Self { nodes: Vec::new(), ways: vec![0; emitters.len()] };
+        if !emitters.is_empty() {
+            let mut order: Vec<u32> = (0..emitters.len() as u32).collect();
+            tree.nodes.reserve(2 * emitters.len());
+            tree.nodes.push(Node::default());
+            tree.build(0, emitters, &mut order, 0, 0);
+        }
+        tree
+    }
+
+    /// Whether there is nothing to choose from.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Fills `node` with those of `order`, and returns them together.
+    fn build(
+        &mut self,
+        node: usize,
+        emitters: &[Emitter],
+        order: &mut [u32],
+        depth: u32,
+        way: u64,
+    ) -> Emitter {
+        if let [only] = *order {
+            let only = only as usize;
+            self.nodes[node] = Node::new(&emitters[only], only, true);
+            self.ways[only] = way;
+            return emitters[only];
+        }
+        let middle = split(emitters, order, depth);
+        let child = self.nodes.len();
+        self.nodes.extend([Node::default(); 2]);
+        let (left, right) = order.split_at_mut(middle);
+        let first = self.build(child, emitters, left, depth + 1, way);
+        let all = first.union(&self.build(child + 1, emitters, right, depth + 1, way | 1 << depth));
+        self.nodes[node] = Node::new(&all, child, false);
+        all
+    }
+
+    /// Probability of the first child.
+    fn share(&self, node: &Node, to: &Receiver) -> f32 {
+        let [a, b] = [0, 1].map(|i| self.nodes[node.child as usize + i].importance(to));
+        // Scaled: of huge ones the sum would overflow.
+        let share = 1.0 / (1.0 + b / a);
+        if share.is_nan() { 0.5 } else { share }
+    }
+
+    /// Chooses one by a number in [0, 1); `None` if there is none.
+    #[must_use]
+    pub fn sample(&self, to: &Receiver, random: f32) -> Option<Chosen> {
+        let mut node = self.nodes.first()?;
+        let (mut chance, mut rest) = (1.0, random);
+        while !node.is_leaf {
+            let share = self.share(node, to);
+            let second = rest >= share;
+            let (here, below) = if second { (1.0 - share, share) } else { (share, 0.0) };
+            chance *= here;
+            rest = ((rest - below) / here).clamp(0.0, 1.0 - f32::EPSILON);
+            node = &self.nodes[node.child as usize + usize::from(second)];
+        }
+        (chance > 0.0).then_some(Chosen { emitter: node.child as usize, chance, rest })
+    }
+
+    /// The [`Chosen::chance`] of an emitter.
+    #[must_use]
+    pub fn chance(&self, to: &Receiver, emitter: usize) -> f32 {
+        let (Some(&way), Some(mut node)) = (self.ways.get(emitter), self.nodes.first()) else { return 0.0 };
+        let (mut way, mut chance) = (way, 1.0);
+        while !node.is_leaf {
+            let share = self.share(node, to);
+            let second = way & 1 == 1;
+            chance *= if second { 1.0 - share } else { share };
+            way >>= 1;
+            node = &self.nodes[node.child as usize + usize::from(second)];
+        }
+        chance
+    }
+}
+
+/// Sorts `order` into two parts, neither of which is empty; returns where the second begins.
+fn split(emitters: &[Emitter], order: &mut [u32], depth: u32) -> usize {
+    let center = |i: u32| emitters[i as usize].bounds.center();
+    let bounds = order.iter().fold(Aabb::EMPTY, |bounds, &i| bounds.with(center(i)));
+    let size = bounds.max - bounds.min;
+    let longest = size.max_element();
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in (0..3).filter(|&axis| size[axis] > 0.0 && depth < DEEP) {
+        let mut bins: [Option<Emitter>; BINS] = [None; BINS];
+        for &i in order.iter().step_by(order.len().div_ceil(JUDGED)) {
+            let bin = &mut bins[bin(&bounds, axis, center(i))];
+            let more = &emitters[i as usize];
+            *bin = Some(bin.map_or(*more, |sum| sum.union(more)));
+        }
+        let join = |sum: Option<Emitter>, more: &Option<Emitter>| match (sum, more) {
+            (Some(sum), Some(more)) => Some(sum.union(more)),
+            (sum, more) => sum.or(*more),
+        };
+        // Long boxes are not cut along their length.
+        let factor = longest / size[axis];
+        for plane in 1..BINS {
+            let [left, right] = [&bins[..plane], &bins[plane..]].map(|side| side.iter().fold(None, join));
+            if let (Some(left), Some(right)) = (left, right) {
+                let cost = factor * (left.cost() + right.cost());
+                if best.is_none_or(|best| cost < best.0) {
+                    best = Some((cost, axis, plane));
+                }
+            }
+        }
+    }
+    match best {
+        Some((_, axis, plane)) => {
+            order.sort_by_key(|&i| bin(&bounds, axis, center(i)) >= plane);
+            order.partition_point(|&i| bin(&bounds, axis, center(i)) < plane)
+        }
+        None => order.len() / 2,
+    }
+}
+
+fn bin(bounds: &Aabb, axis: usize, center: Vec3) -> usize {
+    let place = (center[axis] - bounds.min[axis]) / (bounds.max[axis] - bounds.min[axis]);
+    ((place * BINS as f32) as usize).min(BINS - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::sampler::{hash, unit_float};
+
+    fn numbers(seed: u32) -> impl Iterator<Item = f32> {
+        (0..).map(move |i| unit_float(hash(hash(i) ^ seed)))
+    }
+
+    /// Scattered over a cube, facing anywhere, of powers that differ by four decades.
+    fn scattered(count: usize) -> Vec<Emitter> {
+        let mut random = numbers(1);
+        let mut next = || random.next().unwrap_or_default();
+        let mut emitter = |_| {
+            let middle = Vec3::new(next(), next(), next()) * 10.0;
+            let normal = (Vec3::new(next(), next(), next()) - 0.5).normalize();
+            let bounds = Aabb::around(&[middle - 0.01, middle + 0.01]);
+            Emitter::flat(bounds, normal, next() < 0.3, 10f32.powf(4.0 * next() - 2.0))
+        };
+        (0..count).map(&mut emitter).collect()
+    }
+
+    const HERE: Receiver = Receiver { point: Vec3::new(3.0, 2.0, 5.0), normal: Vec3::Y };
+
+    #[test]
+    fn chances_sum_to_one_and_are_those_of_choosing() {
+        for count in [1, 2, 3, 100, 3000] {
+            let tree = LightTree::new(&scattered(count));
+            let sum: f64 = (0..count).map(|i| f64::from(tree.chance(&HERE, i))).sum();
+            assert!((sum - 1.0).abs() < 1e-5, "{count}: {sum}");
+            for random in numbers(2).take(1000) {
+                let chosen = tree.sample(&HERE, random).expect("there are some");
+                let chance = tree.chance(&HERE, chosen.emitter);
+                assert!((chosen.chance / chance - 1.0).abs() < 1e-5, "{chosen:?} {chance}");
+                assert!((0.0..1.0).contains(&chosen.rest), "{chosen:?}");
+            }
+        }
+        assert_eq!(LightTree::new(&[]).sample(&HERE, 0.5), None);
+    }
+
+    /// What would be best is known: as much as each one brings. The tree is not far from it, choosing by power is.
+    #[test]
+    fn the_choice_follows_what_they_bring() {
+        let emitters = scattered(3000);
+        let tree = LightTree::new(&emitters);
+        let brought = |emitter: &Emitter| {
+            let along = emitter.bounds.center() - HERE.point;
+            let toward = along.normalize();
+            let leaves = if emitter.spread > 3.0 { 1.0 } else { -emitter.axis.dot(toward) };
+            let arrives = HERE.normal.dot(toward);
+            f64::from(emitter.intensity * leaves.max(0.0) * arrives.max(0.0) / along.length_squared())
+        };
+        let total: f64 = emitters.iter().map(brought).sum();
+        let power: f64 = emitters.iter().map(|e| f64::from(e.intensity)).sum();
+        let second = |chance: &dyn Fn(usize) -> f64| {
+            emitters.iter().enumerate().map(|(i, e)| brought(e).powi(2) / chance(i)).sum::<f64>()
+                / total.powi(2)
+        };
+        let by_tree = second(&|i| f64::from(tree.chance(&HERE, i)));
+        let by_power = second(&|i| f64::from(emitters[i].intensity) / power);
+        assert!(by_tree < 3.0 && by_power > 2.0 * by_tree, "{by_tree} {by_power}");
+    }
+
+    #[test]
+    fn what_cannot_be_told_apart_is_still_found() {
+        let dot = Emitter::all_round(Aabb::around(&[Vec3::ONE]), 1.0);
+        let tree = LightTree::new(&vec![dot; 5000]);
+        let line: Vec<Emitter> =
+            (0..100).map(|i| Emitter::all_round(Aabb::around(&[Vec3::X * 2f32.powi(-i)]), 1.0)).collect();
+        let deep = LightTree::new(&line);
+        for (tree, count) in [(tree, 5000), (deep, 100)] {
+            let least = (0..count).map(|i| tree.chance(&HERE, i)).fold(1.0, f32::min);
+            assert!(least > 1e-6, "{least}");
+        }
+        let off = LightTree::new(&[Emitter { intensity: 0.0, ..dot }, Emitter { intensity: 0.0, ..dot }]);
+        assert_eq!(off.chance(&HERE, 0), 0.5);
+    }
+
+    #[test]
+    fn cones_hold_both() {
+        let mut random = numbers(5);
+        let mut next = || random.next().unwrap_or_default();
+        for _ in 0..1000 {
+            let mut cone = || ((Vec3::new(next(), next(), next()) - 0.5).normalize(), next() * next() * 2.0);
+            let (a, b) = (cone(), cone());
+            let (axis, spread) = around_both(a, b);
+            for (inner, its) in [a, b] {
+                let between = axis.dot(inner).clamp(-1.0, 1.0).acos();
+                assert!(spread >= PI || between + its <= spread + 1e-3, "{a:?} {b:?} {axis} {spread}");
+            }
+        }
+    }
+}
