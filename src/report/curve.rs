@@ -86,13 +86,15 @@ pub fn curve(runs: &[Run], measure: Measure) -> Vec<CurvePoint> {
         .collect()
 }
 
-/// The slope over samples, of the points that the reference is good enough for.
+/// The slope over samples, of the points that all runs have reached and that the reference is good enough for: one run
+/// alone may be a seventh off.
 #[must_use]
 pub fn slope(curve: &[CurvePoint], reference_error: Option<f64>) -> Option<Fit> {
     let trusted = |rmse: f64| reference_error.is_none_or(|error| rmse >= TRUSTED * error);
+    let all = curve.iter().map(|point| point.runs).max().unwrap_or(0);
     let points: Vec<(f64, f64)> = curve
         .iter()
-        .filter(|point| point.samples >= FIT_FROM && trusted(point.rmse))
+        .filter(|point| point.samples >= FIT_FROM && point.runs == all && trusted(point.rmse))
         .map(|point| (f64::from(point.samples), point.rmse))
         .collect();
     fit_power(&points)
@@ -131,5 +133,14 @@ mod tests {
         assert_eq!(slope(&curve, None).unwrap().points, 6);
         assert_eq!(slope(&curve, Some(0.5f64.powi(8))).unwrap().points, 4);
         assert_eq!(slope(&curve, Some(0.1)), None);
+    }
+
+    #[test]
+    fn what_only_some_runs_have_reached_is_not_fitted() {
+        let at = |i: i32, by: f64| (1 << i, by * 0.5f64.powi(i));
+        let short: Vec<_> = (1..7).map(|i| at(i, 1.5)).collect();
+        let long: Vec<_> = (1..10).map(|i| at(i, 1.0)).collect();
+        let fit = slope(&curve(&[run(&short), run(&long)], Measure::All), None).unwrap();
+        assert!(fit.points == 4 && (fit.slope + 1.0).abs() < 1e-9, "{fit:?}");
     }
 }

@@ -26,8 +26,8 @@ pub struct MeshLight {
     emitter: Emitter,
 }
 
-/// Up to this many are chosen by their area alone.
-const FEW: usize = 4;
+/// Up to this many are chosen by their area alone: there is little to be won.
+const FEW: usize = 16;
 /// So often one of many is chosen by its area: what it is expected to bring does not know what is in between.
 const BY_AREA: f32 = 0.25;
 

@@ -141,7 +141,9 @@ fn clamped_samples_are_found() {
 
 #[test]
 fn one_pixel_in_the_umbra_is_found() {
-    let spots = penumbra(1.0, 9);
+    // Where part of the light is seen is another test's.
+    let mut spots = penumbra(1.0, 9);
+    spots.retain(|spot| !matches!(spot.expected, Expected::Value { .. }));
     let leak = |ask: &Ask| {
         let dark = matches!(ask.spot.expected, Expected::Dark);
         but(ask, |i, pixel| if dark && i == 77 { 1e-30 } else { pixel })
@@ -176,15 +178,20 @@ fn an_edge_a_little_off_is_found() {
 #[test]
 fn what_is_no_number_is_found() {
     let odd = |bad: f64| move |ask: &Ask| but(ask, |i, pixel| if i == 9 { bad } else { pixel });
+    let mut odd_places = awkward_places();
+    odd_places.retain(|spot| matches!(spot.expected, Expected::Finite));
+    odd_places.truncate(2);
+    let mut spots = quads();
+    spots.truncate(1);
     for bad in [f64::NAN, f64::INFINITY, -1e-9] {
-        finds("finite", &judged(&awkward_places(), &odd(bad)));
+        finds("finite", &judged(&odd_places, &odd(bad)));
     }
-    finds("computed", &judged(&quads(), &odd(f64::NAN)));
-    let sampled: Vec<Spot> = quads().into_iter().map(|spot| Spot { computed: false, ..spot }).collect();
+    finds("computed", &judged(&spots, &odd(f64::NAN)));
+    let sampled: Vec<Spot> = spots.iter().map(|spot| Spot { computed: false, ..spot.clone() }).collect();
     let few = |ask: &Ask| odd(f64::NAN)(&Ask { samples: ask.samples.min(64), ..*ask });
     finds("standard errors off", &judged(&sampled, &few));
     let dropped = |ask: &Ask| Reading { dropped: 1, ..right(ask) };
-    finds("no number", &judged(&quads(), &dropped));
+    finds("no number", &judged(&spots, &dropped));
 }
 
 #[test]
