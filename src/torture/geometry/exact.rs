@@ -149,7 +149,7 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
         let places = if family.name == "any size" { &Place::ALL[..1] } else { &Place::ALL };
         sets.extend(places.iter().map(|&place| (family, place)));
     }
-    let each = trial.pick(2 * BATCH, 16 * BATCH, 1_000_000);
+    let each = trial.pick(2 * BATCH, 8 * BATCH, 1_000_000);
     let mut checks = vec![bad_case(makers)];
     for (number, &(family, place)) in sets.iter().enumerate() {
         let what = format!("{}, {}", family.name, place.name());

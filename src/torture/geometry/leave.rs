@@ -149,7 +149,7 @@ fn any_placement(rng: &mut Rng) -> DAffine3 {
 /// The case for any way of leaving a surface.
 #[must_use]
 pub fn gaps(trial: &Trial<'_>, leave: Leave) -> Vec<Check> {
-    let count = trial.pick(2000, 20_000, 1_000_000) as usize;
+    let count = trial.pick(2000, 10_000, 1_000_000) as usize;
     let mut checks = Vec::new();
     for (number, place) in Place::ALL.into_iter().enumerate() {
         trial.tell(GAP.id, place.name(), number as f64 / 10.0);

@@ -32,7 +32,7 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Opt
 /// The case for whatever answers rays.
 #[must_use]
 pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
-    let count = trial.pick(128, 1024, 100_000) as usize;
+    let count = trial.pick(128, 512, 100_000) as usize;
     let mut checks = Vec::new();
     for (number, place) in Place::ALL.into_iter().enumerate() {
         let part = number as f64 / Place::ALL.len() as f64;
@@ -97,7 +97,7 @@ fn into_square(rng: &mut Rng, place: Place) -> Ray {
 /// an instance of its own.
 fn floors(trial: &Trial<'_>) -> Vec<Check> {
     let (red, green) = (Vec3::new(0.8, 0.1, 0.1), Vec3::new(0.1, 0.8, 0.1));
-    let samples = trial.pick(2, 8, 256) as u32;
+    let samples = trial.pick(2, 4, 256) as u32;
     let mut checks = Vec::new();
     for place in Place::ALL {
         let picture = |meshes: &[&[Vec3]], threads: usize| {

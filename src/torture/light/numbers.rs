@@ -107,7 +107,7 @@ fn scrambling(trial: &Trial<'_>) -> Vec<Check> {
         .iter()
         .flat_map(|i| [0, 1, 2, 4, 40].map(|p| (*i, p)))
         .collect();
-    let count = trial.pick(10_000, 100_000, 10_000_000);
+    let count = trial.pick(10_000, 50_000, 10_000_000);
     let at = |index, pair, seed| Sampler::new(UVec2::new(3, 4), index, seed).pair(pair);
     let mut checks = vec![over_seeds("a point over seeds", count, trial.seed * count, &points, at)];
     // And over pixels, of which neighbours have hardly another seed.

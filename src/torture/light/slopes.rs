@@ -162,7 +162,7 @@ fn long_run(trial: &Trial<'_>) -> Vec<Check> {
     let Expected::Value { exact, .. } = &spot.expected else { return Vec::new() };
     let exact = exact(spot.point);
     // A pixel: 2¹⁴, 2¹⁶, or 10⁷.
-    let most = trial.pick(1 << 14, 1 << 16, 10_000_000) as u32;
+    let most = trial.pick(1 << 14, 1 << 15, 10_000_000) as u32;
     let mut checks = Vec::new();
     for sampling in [Sampling::Independent, Sampling::Sobol] {
         let chosen = RenderSettings {
