@@ -117,7 +117,7 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
             sets.push((format!("{name}, {}", place.name()), there));
         }
     }
-    let (each, batch) = (trial.pick(512, 4 * BATCH, 1_000_000), trial.pick(256, BATCH, BATCH));
+    let (each, batch) = (trial.pick(512, 3 * BATCH, 1_000_000), trial.pick(256, BATCH, BATCH));
     let mut checks = Vec::new();
     for (number, (what, triangles)) in sets.iter().enumerate() {
         let part = [number, number + 1].map(|n| n as f64 / sets.len() as f64);

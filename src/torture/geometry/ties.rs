@@ -32,7 +32,7 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Opt
 /// The case for whatever answers rays.
 #[must_use]
 pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
-    let count = trial.pick(128, 512, 100_000) as usize;
+    let count = trial.pick(128, 256, 100_000) as usize;
     let mut checks = Vec::new();
     for (number, place) in Place::ALL.into_iter().enumerate() {
         let part = number as f64 / Place::ALL.len() as f64;

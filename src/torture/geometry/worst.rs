@@ -97,7 +97,7 @@ fn build(triangles: &[[Vec3; 3]]) -> (Blas, f64) {
 }
 
 fn run(trial: &Trial<'_>) -> Vec<Check> {
-    let many = trial.pick(20_000, 60_000, 1_000_000) as usize;
+    let many = trial.pick(20_000, 40_000, 1_000_000) as usize;
     let mut checks = Vec::new();
     let mut random = f64::NAN;
     let kinds = kinds(many);

@@ -80,7 +80,7 @@ pub fn bias(what: &str, samples: u64, means: &[f64], exact: f64) -> Vec<Check> {
 
 fn adaptive(trial: &Trial<'_>) -> Vec<Check> {
     let (stage, exact) = (strip(), strip_in_closed_form());
-    let seeds = trial.pick(320, 640, 100_000);
+    let seeds = trial.pick(320, 400, 100_000);
     let mut checks = Vec::new();
     for samples in [8, 16, 64] {
         if trial.effort != Effort::Long && samples > 16 {

@@ -84,11 +84,11 @@ pub fn shadows_of_a_line() -> Vec<Spot> {
     spots
 }
 
-/// 201 places at the origin, and 21 elsewhere; all everywhere if there is time.
+/// 201 places at the origin, and 11 elsewhere; all everywhere if there is time.
 fn edges(trial: &Trial<'_>, id: &'static str, h: f64) -> Vec<Check> {
     let [here, elsewhere] = match trial.effort {
         Effort::Quick => [11, 11],
-        Effort::Normal => [201, 21],
+        Effort::Normal => [201, 11],
         Effort::Long => [201, 201],
     };
     const ALL: &[Place] = &Place::ALL;

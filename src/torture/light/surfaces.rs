@@ -162,7 +162,7 @@ pub fn all_surfaces(trial: &Trial<'_>, wrong: &(dyn Fn(Vec3) -> f64 + Sync)) -> 
     let kinds: Vec<_> = glossy.chain(layered).collect();
     let jobs: Vec<_> = kinds.iter().flat_map(|kind| DEGREES.map(|degrees| (kind, degrees))).collect();
     let draws = Draws {
-        count: trial.pick(20_000, 40_000, 100_000),
+        count: trial.pick(20_000, 25_000, 100_000),
         seed: trial.seed.wrapping_add(12),
         cells: CELLS,
         fine: 1024,

@@ -122,7 +122,7 @@ fn mirrors(trial: &Trial<'_>) -> Vec<Check> {
             checks.push(all_the_same(&format!("{k} bounces, {}", place.name()), &reds(&film), exact, 1e-6));
         }
         // From the fifth bounce on paths end by chance.
-        for (k, size, samples) in [(9, 32, [1024, 1024, 100_000]), (1000, 64, [0, 1024, 25_000])] {
+        for (k, size, samples) in [(9, 32, [1024, 1024, 100_000]), (1000, 64, [0, 2048, 25_000])] {
             let exact = (1.0 - r.powi(k + 1)) / (1.0 - r);
             let samples = trial.pick(samples[0], samples[1], samples[2]) as u32;
             // Long paths take long: once, and not in a hurry.
@@ -192,9 +192,7 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
     }
     // A closed room that shines: 1 / (1 − albedo). Paths are long where it is bright.
     for (albedo, more) in [(0.5f32, 2), (0.8, 8)] {
-        // Without hours to spend: the bright one once, in a hurry both.
-        let once = trial.effort == Effort::Quick || trial.effort == Effort::Normal && more > 2;
-        if once && place != Place::ORIGIN {
+        if trial.effort != Effort::Long && place != Place::ORIGIN {
             continue;
         }
         let walls = Material { emission: Vec3::ONE, ..Material::lambert(Vec3::splat(albedo)) };
