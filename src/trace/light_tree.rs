@@ -343,7 +343,7 @@ mod tests {
             let sum: f64 = (0..count).map(|i| f64::from(tree.chance(&HERE, i))).sum();
             assert!((sum - 1.0).abs() < 1e-5, "{count}: {sum}");
             for random in numbers(2).take(1000) {
-                let chosen = tree.sample(&HERE, random).expect("there are some");
+                let chosen = tree.sample(&HERE, random).unwrap();
                 let chance = tree.chance(&HERE, chosen.emitter);
                 assert!((chosen.chance / chance - 1.0).abs() < 1e-5, "{chosen:?} {chance}");
                 assert!((0.0..1.0).contains(&chosen.rest), "{chosen:?}");
