@@ -6,7 +6,9 @@ mod lamps;
 #[path = "support/stage.rs"]
 mod stage;
 
-use lamps::measure;
+use lamps::{SIZE, beside_a_ball, measure};
+use penumbra::trace::Integrator;
+use stage::Frames as _;
 
 /// The floor that was set: with ten thousand, an error of at most that of ten after three times as many samples. What
 /// they cost in time `cargo bench --bench many_lights` measures.
@@ -32,4 +34,28 @@ fn however_they_are_chosen_it_is_the_same_light() {
         println!("depth {depth}: {a:.5} and {b:.5}, ± {sigma:.5}");
         assert!((a - b).abs() < 4.5 * sigma && sigma < 0.01 * a, "depth {depth}: {a} {b} ± {sigma}");
     }
+}
+
+/// Paths weigh what a bounce runs into against the chance of having chosen it where the bounce began: on a coarse ball
+/// that is shaded smoothly, that is not where its ray begins.
+#[test]
+fn beside_a_smooth_ball_bounces_and_light_samples_agree() {
+    let [light_samples, both] = [Integrator::Direct, Integrator::Path].map(|integrator| {
+        let mut means = Vec::new();
+        for seed in 0..32 {
+            let mut stage = beside_a_ball(seed, integrator);
+            let film = stage.trace(64);
+            means.push(
+                (0..SIZE).flat_map(|y| film.row(y).map(|p| p.mean().y).collect::<Vec<_>>()).sum::<f64>(),
+            );
+        }
+        let n = means.len() as f64;
+        let mean = means.iter().sum::<f64>() / n;
+        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
+        [mean, variance]
+    });
+    let sigma = (light_samples[1] + both[1]).sqrt();
+    let off = (both[0] - light_samples[0]) / sigma;
+    println!("{:.4} and {:.4}: {off:+.2} σ of {:.1e}", light_samples[0], both[0], sigma / both[0]);
+    assert!(off.abs() < 4.5 && sigma < 2e-3 * both[0], "{off} σ");
 }

@@ -227,7 +227,7 @@ fn a_light_of_no_use_is_no_harm() {
 #[test]
 fn lights_beyond_all_measure_are_still_chosen() {
     let lamp = |i: f32| FlatLight::Point { position: Vec3::ZERO, intensity: Vec3::splat(i) };
-    let lights = Lights::new(vec![lamp(3e38), lamp(3e38), lamp(1.0)], Vec::new());
+    let lights = Lights::new(vec![lamp(3e38), lamp(3e38), lamp(1.0)], Vec::new(), None);
     let to = Receiver { point: Vec3::ZERO, normal: Vec3::Z };
     let chances: Vec<f32> = (0..3).map(|i| lights.chance(1, i, &to)).collect();
     assert!(chances.iter().all(|&c| c > 0.0), "{chances:?}");

@@ -51,7 +51,7 @@ pub fn sync_lights(
             flat.push(FlatLight::Mesh(light));
         }
     }
-    *lights = Lights::new(flat, meshes);
+    *lights = Lights::new(flat, meshes, Some(&lights));
     redone.lights += 1;
 }
 

@@ -307,6 +307,7 @@ impl Batch {
             }
             let (origin, direction, normal) =
                 (block.origin.get(i), out.direction.get(i), block.normal.get(i));
+            let from = Receiver { point: block.position.get(i), normal };
             let mut sampler = path.sampler;
             if shares {
                 let side = block.geometric_normal.get(i);
@@ -319,7 +320,7 @@ impl Batch {
                 ray: Ray::new(origin, direction),
                 throughput,
                 depth: depth + 1,
-                bounce: Some(Bounce { pdf, normal, counted: self.diffuse.counted[i] }),
+                bounce: Some(Bounce { pdf, from, counted: self.diffuse.counted[i] }),
                 last: false,
                 absorption: Vec3::ZERO,
             });

@@ -43,7 +43,8 @@ pub(super) struct Path {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounce {
     pub(super) pdf: f32,
-    pub(super) normal: Vec3,
+    /// The very one for which lights were chosen: where it is they may be as likely by a factor of a hundred.
+    pub(super) from: Receiver,
     /// Lights that have been counted in full where it comes from, a bit for each.
     pub(super) counted: u32,
 }
@@ -244,12 +245,13 @@ impl Batch {
         let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
         if let Some(found) = may_meet.then(|| scene.lights.closest(&before_hit)).flatten() {
             let radiance = found.shape.emitted(&path.ray, &found.hit);
-            let pdf = path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.normal, &found.hit));
+            let pdf =
+                path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.from.normal, &found.hit));
             self.collect(scene, path, found.light, radiance, pdf);
             return;
         }
         let Some(hit) = hit else {
-            let normal = path.bounce.map_or(Vec3::Z, |b| b.normal);
+            let normal = path.bounce.map_or(Vec3::Z, |b| b.from.normal);
             for (light, beyond) in scene.lights.beyond() {
                 if let Some((radiance, pdf)) = beyond.beyond(normal, path.ray.direction) {
                     self.collect(scene, path, light, radiance, pdf);
@@ -283,10 +285,9 @@ impl Batch {
                     let distance2 = (at.position - path.ray.origin).length_squared();
                     let cos = at.geometric_normal.dot(path.ray.direction).abs();
                     let pdf = match scene.lights.get(light) {
-                        FlatLight::Mesh(mesh) => path.bounce.map_or(0.0, |bounce| {
-                            let from = Receiver { point: path.ray.origin, normal: bounce.normal };
-                            mesh.pdf(hit.triangle, &from, distance2, cos)
-                        }),
+                        FlatLight::Mesh(mesh) => path
+                            .bounce
+                            .map_or(0.0, |bounce| mesh.pdf(hit.triangle, &bounce.from, distance2, cos)),
                         _ => 0.0,
                     };
                     self.collect(scene, path, light, emission, pdf);
@@ -305,8 +306,7 @@ impl Batch {
             if light < u32::BITS && bounce.counted >> light & 1 == 1 {
                 return 0.0;
             }
-            let from = Receiver { point: path.ray.origin, normal: bounce.normal };
-            let light_pdf = pdf * scene.lights.chance(path.depth - 1, light, &from);
+            let light_pdf = pdf * scene.lights.chance(path.depth - 1, light, &bounce.from);
             power_heuristic(bounce.pdf, light_pdf)
         });
         self.radiance[path.entry as usize] += path.throughput * radiance * weight;
@@ -315,6 +315,7 @@ impl Batch {
     /// Queues shadow rays to lights, and the ray that goes on.
     pub(super) fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
         let bsdf = at.bsdf(scene, surface);
+        let to = Receiver { point: at.position, normal: bsdf.normal() };
         let base = 1 + path.depth * PAIRS_PER_BOUNCE;
         // Direct lighting finds Lambert's share by light samples alone: no ray is spent on it.
         let followed = match scene.settings.integrator {
@@ -326,7 +327,6 @@ impl Batch {
                 let pair = index as u32 * 2;
                 let by_chance = !scene.lights.samples_all(path.depth);
                 let random = if by_chance { path.sampler.pair(base + PICK).x } else { 0.0 };
-                let to = Receiver { point: at.position, normal: bsdf.normal() };
                 let pick = scene.lights.pick(path.depth, index, &to, random);
                 let u = path.sampler.pair(base + LIGHT + pair);
                 if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {
@@ -369,7 +369,7 @@ impl Batch {
             ray: Ray::new(origin, sample.wi),
             throughput,
             depth: path.depth + 1,
-            bounce: sample.pdf.map(|pdf| Bounce { pdf, normal: bsdf.normal(), counted: 0 }),
+            bounce: sample.pdf.map(|pdf| Bounce { pdf, from: to, counted: 0 }),
             last: !sample.follow && scene.settings.integrator == Integrator::Direct,
             absorption,
         });

@@ -274,23 +274,31 @@ fn split(emitters: &[Emitter], order: &mut [u32], depth: u32) -> usize {
     let bounds = order.iter().fold(Aabb::EMPTY, |bounds, &i| bounds.with(center(i)));
     let size = bounds.max - bounds.min;
     let longest = size.max_element();
+    if order.len() <= 2 {
+        return 1;
+    }
+    let join = |sum: Option<Emitter>, more: Option<Emitter>| match (sum, more) {
+        (Some(sum), Some(more)) => Some(sum.union(&more)),
+        (sum, more) => sum.or(more),
+    };
     let mut best: Option<(f32, usize, usize)> = None;
     for axis in (0..3).filter(|&axis| size[axis] > 0.0 && depth < DEEP) {
         let mut bins: [Option<Emitter>; BINS] = [None; BINS];
         for &i in order.iter().step_by(order.len().div_ceil(JUDGED)) {
             let bin = &mut bins[bin(&bounds, axis, center(i))];
-            let more = &emitters[i as usize];
-            *bin = Some(bin.map_or(*more, |sum| sum.union(more)));
+            *bin = join(*bin, Some(emitters[i as usize]));
         }
-        let join = |sum: Option<Emitter>, more: &Option<Emitter>| match (sum, more) {
-            (Some(sum), Some(more)) => Some(sum.union(more)),
-            (sum, more) => sum.or(*more),
-        };
+        // What is to the right of each plane, from the last on; then what is to the left, from the first on.
+        let mut right = bins;
+        for i in (0..BINS - 1).rev() {
+            right[i] = join(bins[i], right[i + 1]);
+        }
         // Long boxes are not cut along their length.
         let factor = longest / size[axis];
+        let mut left = None;
         for plane in 1..BINS {
-            let [left, right] = [&bins[..plane], &bins[plane..]].map(|side| side.iter().fold(None, join));
-            if let (Some(left), Some(right)) = (left, right) {
+            left = join(left, bins[plane - 1]);
+            if let (Some(left), Some(right)) = (left, right[plane]) {
                 let cost = factor * (left.cost() + right.cost());
                 if best.is_none_or(|best| cost < best.0) {
                     best = Some((cost, axis, plane));

@@ -1,18 +1,21 @@
 //! All lights together: which to sample, and which a ray runs into.
 
 use super::light::FlatLight;
-use super::light_tree::{LightTree, Receiver};
+use super::light_tree::{Emitter, LightTree, Receiver};
 use super::shape_light::{ShapeHit, ShapeLight};
 use crate::bvh::{Aabb, Bvh, Probe, Ray, Shaft};
 use bevy_ecs::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// All lights, ready to be sampled and hit.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Lights {
     lights: Vec<FlatLight>,
     /// Over those that are somewhere, if ever only one is sampled.
-    tree: LightTree,
+    tree: Arc<LightTree>,
+    /// What it was made of.
+    emitters: Vec<Emitter>,
     /// Their numbers in `lights`.
     placed: Vec<u32>,
     /// Of each light its place in `placed`; `u32::MAX` for others.
@@ -56,9 +59,9 @@ const EVENLY: f32 = 0.25;
 const FEW_SHAPES: usize = 4;
 
 impl Lights {
-    /// `meshes` names the light of each emissive (instance, slot).
+    /// `meshes` names the light of each emissive (instance, slot). What is as it was `before` is not made again.
     #[must_use]
-    pub fn new(lights: Vec<FlatLight>, mut meshes: Vec<((u32, u16), u32)>) -> Self {
+    pub fn new(lights: Vec<FlatLight>, mut meshes: Vec<((u32, u16), u32)>, before: Option<&Self>) -> Self {
         meshes.sort_unstable();
         let (mut placed, mut unplaced) = (Vec::new(), Vec::new());
         let (mut emitters, mut places) = (Vec::new(), vec![u32::MAX; lights.len()]);
@@ -73,7 +76,10 @@ impl Lights {
                 }
             }
         }
-        let tree = LightTree::new(&emitters);
+        let tree = match before {
+            Some(before) if before.emitters == emitters => Arc::clone(&before.tree),
+            _ => Arc::new(LightTree::new(&emitters)),
+        };
         let numbered = || lights.iter().zip(0u32..);
         let solid: Vec<(u32, Aabb)> = numbered()
             .filter_map(|(l, i)| match l {
@@ -91,7 +97,7 @@ impl Lights {
             })
             .map(|(_, i)| i)
             .collect();
-        Self { tree, placed, places, unplaced, shapes, shape_lights, beyond, meshes, lights }
+        Self { tree, emitters, placed, places, unplaced, shapes, shape_lights, beyond, meshes, lights }
     }
 
     /// Light number `index`.
@@ -130,13 +136,15 @@ impl Lights {
             return Pick { light, chance: self.chance(depth, light, to) };
         }
         let rest = (random - EVENLY) / (1.0 - EVENLY) * self.groups();
-        let last = self.lights.len() as u32 - 1;
-        let (light, among) = match (self.unplaced.get(rest as usize), self.tree.sample(to, rest.fract())) {
-            (Some(&light), _) => (light, 1.0),
-            (None, Some(chosen)) => (self.placed[chosen.emitter], chosen.chance),
-            (None, None) => (self.unplaced.last().copied().unwrap_or(last), 1.0),
-        };
-        Pick { light, chance: self.mixed(among) }
+        if let Some(&light) = self.unplaced.get(rest as usize) {
+            return Pick { light, chance: self.mixed(1.0) };
+        }
+        if let Some(chosen) = self.tree.sample(to, rest.fract()) {
+            return Pick { light: self.placed[chosen.emitter], chance: self.mixed(chosen.chance) };
+        }
+        // Only where the last of a group was missed by rounding.
+        let light = self.lights.len() as u32 - 1;
+        Pick { light, chance: self.chance(depth, light, to) }
     }
 
     /// The [`Pick::chance`] of `light` after `depth` bounces.
@@ -258,5 +266,48 @@ impl Lights {
     pub fn of_mesh(&self, instance: u32, slot: u16) -> Option<u32> {
         let found = self.meshes.binary_search_by_key(&(instance, slot), |(key, _)| *key);
         found.ok().map(|i| self.meshes[i].1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    /// A sky, a sun and twenty lamps.
+    fn mixed() -> Lights {
+        let mut lights = vec![
+            FlatLight::Environment { radiance: Vec3::ONE },
+            FlatLight::Directional { axis: Vec3::NEG_Y, irradiance: Vec3::ONE, sin2_radius: 0.0 },
+        ];
+        let at = |i: u8| Vec3::new(f32::from(i), 3.0, f32::from(i % 3));
+        lights.extend((0..20).map(|i| FlatLight::Point { position: at(i), intensity: Vec3::ONE }));
+        Lights::new(lights, Vec::new(), None)
+    }
+
+    #[test]
+    fn chances_are_those_of_picks_and_sum_to_one() {
+        let (lights, to) = (mixed(), Receiver { point: Vec3::ZERO, normal: Vec3::Y });
+        let chances: Vec<f64> = (0..22).map(|light| f64::from(lights.chance(0, light, &to))).collect();
+        assert!((chances.iter().sum::<f64>() - 1.0).abs() < 1e-6, "{chances:?}");
+        let (mut counts, count) = ([0.0; 22], 1 << 16);
+        for i in 0..count {
+            let pick = lights.pick(0, 0, &to, (i as f32 + 0.5) / count as f32);
+            let chance = chances[pick.light as usize];
+            assert!((f64::from(pick.chance) / chance - 1.0).abs() < 1e-5, "{pick:?} {chance}");
+            counts[pick.light as usize] += 1.0 / f64::from(count);
+        }
+        for (count, chance) in counts.iter().zip(&chances) {
+            assert!((count - chance).abs() < 1e-3, "{counts:?} {chances:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_as_it_was_is_not_made_again() {
+        let before = mixed();
+        let same = Lights::new(before.lights.clone(), Vec::new(), Some(&before));
+        assert!(Arc::ptr_eq(&same.tree, &before.tree));
+        let other = Lights::new(before.lights[..21].to_vec(), Vec::new(), Some(&before));
+        assert!(!Arc::ptr_eq(&other.tree, &before.tree));
     }
 }

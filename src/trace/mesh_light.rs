@@ -5,6 +5,7 @@ use super::light_tree::{Emitter, LightTree, Receiver};
 use super::spherical::{SphericalTriangle, meet, weights};
 use crate::bvh::Aabb;
 use glam::{Vec2, Vec3};
+use std::sync::Arc;
 
 /// Triangles of an emissive instance. A few are chosen by their area, many by what they may bring.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,12 +19,14 @@ pub struct MeshLight {
     /// Cumulative part of the area, beside `triangles`; the last is 1.
     pub(crate) cumulative: Vec<f32>,
     /// Empty for a few.
-    tree: LightTree,
+    tree: Arc<LightTree>,
     /// Emits on the back too.
     pub(crate) two_sided: bool,
     /// The placement mirrors: the front is where `corners` run clockwise.
     pub(crate) mirrored: bool,
-    emitter: Emitter,
+    /// All of them together, as if they shone with luminance 1.
+    shape: Emitter,
+    luminance: f32,
 }
 
 /// Up to this many are chosen by their area alone: there is little to be won.
@@ -60,29 +63,28 @@ impl MeshLight {
             (sum / total) as f32
         }));
         *light.cumulative.last_mut()? = 1.0;
-        let emitters = || {
-            light.corners.iter().zip(&areas).map(|(corners, area)| {
-                Emitter::flat(Aabb::around(corners), light.front(corners), two_sided, *area)
-            })
+        light.luminance = luminance;
+        let same = |before: &&Self| {
+            before.corners == light.corners && [before.two_sided, before.mirrored] == [two_sided, mirrored]
         };
-        let all = emitters().reduce(|all, more| all.union(&more))?;
-        let emitter = Emitter { intensity: luminance * total as f32, ..all };
-        if light.corners.len() > FEW {
-            let same = |before: &&Self| {
-                before.corners == light.corners
-                    && [before.two_sided, before.mirrored] == [two_sided, mirrored]
-            };
-            light.tree = match before.filter(same) {
-                Some(before) => before.tree.clone(),
-                None => LightTree::new(&emitters().collect::<Vec<_>>()),
-            };
+        if let Some(before) = before.filter(same) {
+            (light.shape, light.tree) = (before.shape, Arc::clone(&before.tree));
+            return Some(light);
         }
-        light.emitter = emitter;
+        let flat = |(corners, area): (&[Vec3; 3], &f32)| {
+            Emitter::flat(Aabb::around(corners), light.front(corners), two_sided, *area)
+        };
+        let emitters: Vec<Emitter> = light.corners.iter().zip(&areas).map(flat).collect();
+        light.shape = emitters.iter().copied().reduce(|all, more| all.union(&more))?;
+        if emitters.len() > FEW {
+            light.tree = Arc::new(LightTree::new(&emitters));
+        }
         Some(light)
     }
 
+    /// What a choice among many lights needs to know.
     pub(super) fn emitter(&self) -> Emitter {
-        self.emitter
+        Emitter { intensity: self.shape.intensity * self.luminance, ..self.shape }
     }
 
     /// Unit normal of the side that shines; zero where it has none.
@@ -128,6 +130,9 @@ impl MeshLight {
 
     /// A direction toward it; see [`super::light::FlatLight::sample`].
     pub(super) fn sample(&self, to: &Receiver, u: Vec2) -> Option<LightSample> {
+        if self.corners.is_empty() {
+            return None;
+        }
         let point = to.point;
         let (i, share, rest) = self.choose(to, u.x);
         let corners = &self.corners[i];
@@ -183,4 +188,65 @@ fn seen_from(corners: &[Vec3; 3], point: Vec3) -> Option<SphericalTriangle> {
 #[must_use]
 pub fn triangle_area([a, b, c]: &[Vec3; 3]) -> f32 {
     0.5 * (*b - *a).cross(*c - *a).length()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::sampler::{hash, unit_float};
+
+    /// Forty triangles on a bowl, shining inward or, mirrored, outward.
+    fn bowl(mirrored: bool) -> MeshLight {
+        let at = |i: u32, up: f32| {
+            let (y, x) = (i as f32 * 0.157).sin_cos();
+            Vec3::new(x * (1.0 + up), up * (1.0 + 0.1 * x), y * (1.0 + up))
+        };
+        let triangles = (0..40).map(|i| (i + 5, [at(i, 0.0), at(i + 1, 0.0), at(i, 1.0)]));
+        MeshLight::new(0, triangles, [false, mirrored], 1.0, None).unwrap()
+    }
+
+    #[test]
+    fn triangles_are_chosen_as_their_chances_say_and_densities_are_those_of_samples() {
+        for mirrored in [false, true] {
+            let light = bowl(mirrored);
+            for point in [Vec3::new(0.3, 0.2, 0.1), Vec3::new(3.0, 0.5, 0.0), Vec3::new(0.0, -4.0, 0.0)] {
+                let to = Receiver { point, normal: Vec3::Y };
+                let chances: Vec<f64> = (0..40).map(|i| f64::from(light.chance(&to, i))).collect();
+                assert!((chances.iter().sum::<f64>() - 1.0).abs() < 1e-5, "{chances:?}");
+                let (mut counts, count) = ([0.0; 40], 1 << 16);
+                for i in 0..count {
+                    let random = (i as f32 + 0.5) / count as f32;
+                    counts[light.choose(&to, random).0] += 1.0 / f64::from(count);
+                    let u = Vec2::new(random, unit_float(hash(i)));
+                    let Some(sample) = light.sample(&to, u) else { continue };
+                    let (Some(target), Some(pdf), Some((_, triangle))) =
+                        (sample.target, sample.pdf, sample.triangle)
+                    else {
+                        panic!("{sample:?}")
+                    };
+                    let normal = light.front(&light.corners[triangle as usize - 5]);
+                    let along = target - point;
+                    let cos = normal.dot(along.normalize()).abs();
+                    let asked = light.pdf(triangle, &to, along.length_squared(), cos);
+                    // At a flat angle the cosine of the rounded target is less exact.
+                    assert!((asked / pdf - 1.0).abs() < 1e-4 / cos, "{asked} {pdf}");
+                }
+                for (count, chance) in counts.iter().zip(&chances) {
+                    assert!((count - chance).abs() < 1e-3, "{counts:?} {chances:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_as_it_was_is_not_made_again() {
+        let before = bowl(false);
+        let again = |light: &MeshLight, mirrored: bool| {
+            let triangles = light.triangles.iter().copied().zip(light.corners.iter().copied());
+            MeshLight::new(0, triangles, [false, mirrored], 2.0, Some(light)).unwrap()
+        };
+        assert!(Arc::ptr_eq(&again(&before, false).tree, &before.tree));
+        assert!(!Arc::ptr_eq(&again(&before, true).tree, &before.tree));
+        assert_eq!(again(&before, false).emitter().intensity, 2.0 * before.emitter().intensity);
+    }
 }

@@ -29,7 +29,7 @@ pub struct RenderSettings {
 }
 
 impl RenderSettings {
-    /// Whether neighbours share their paths, if the scene allows it.
+    /// Whether neighbours share their paths.
     #[must_use]
     pub fn shares_paths(&self) -> bool {
         self.reuse && self.integrator == Integrator::Path && self.max_depth > 1

@@ -1,14 +1,14 @@
 //! A room lit by any number of small lamps.
 #![allow(dead_code, reason = "the test and the bench each use their part")]
 
-use crate::stage::{Frames as _, Stage, cube, quad, settings};
+use crate::stage::{Frames as _, Stage, ball, cube, quad, settings};
 use glam::{DAffine3, DVec3, Vec3};
 use penumbra::scene::{Light, Material, TriangleMesh};
 use penumbra::torture::oracle::Rng;
 use penumbra::trace::{Integrator, RenderSettings};
 use std::time::{Duration, Instant};
 
-const SIZE: u32 = 24;
+pub const SIZE: u32 = 24;
 const SEEDS: u32 = 24;
 
 /// A room with a shelf in it, lit by `count` shining triangles under its ceiling, of the same power together, which hang
@@ -46,6 +46,26 @@ fn room(seed: u32, count: usize, apart: bool, depth: u32) -> Stage {
         stage.add_mesh(mesh, shining, here);
     }
     stage.look(DVec3::new(0.0, -0.5, -0.9), DVec3::new(0.0, -0.8, 0.4), DVec3::Y, 1.0);
+    stage
+}
+
+/// A coarse ball that is shaded smoothly, between three hundred shining triangles that face it.
+pub fn beside_a_ball(seed: u32, integrator: Integrator) -> Stage {
+    let settings = RenderSettings { seed, ..settings(SIZE, SIZE, integrator, 1) };
+    let mut stage = Stage::new(settings);
+    let mut smooth = ball(4);
+    smooth.normals = smooth.positions.clone();
+    stage.add_mesh(smooth, Material::lambert(Vec3::splat(0.8)), DAffine3::IDENTITY);
+    let (mut rng, mut mesh) = (Rng(9), TriangleMesh::default());
+    for i in 0..300 {
+        let out = rng.direction();
+        let (middle, turn) = (out * (1.1 + 0.4 * rng.unit()), out.any_orthonormal_pair());
+        mesh.positions.extend([middle, middle + turn.0 * 0.03, middle + turn.1 * 0.03]);
+        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let shining = Material { double_sided: true, ..Material::emissive(Vec3::splat(20.0)) };
+    stage.add_mesh(mesh, shining, DAffine3::IDENTITY);
+    stage.look(DVec3::new(0.0, 0.6, 3.0), DVec3::ZERO, DVec3::Y, 0.6);
     stage
 }
 

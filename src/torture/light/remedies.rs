@@ -307,7 +307,7 @@ fn unlike(trial: &Trial<'_>) -> Vec<Check> {
             position: Vec3::ZERO,
             intensity: Vec3::splat(rng.decades(-8.0, 8.0).abs()),
         };
-        let lights = Lights::new((0..n).map(|_| lamp(&mut rng)).collect(), Vec::new());
+        let lights = Lights::new((0..n).map(|_| lamp(&mut rng)).collect(), Vec::new(), None);
         let to = Receiver { point: Vec3::NEG_Z, normal: Vec3::Z };
         let chances: Vec<f64> = (0..n as u32).map(|i| f64::from(lights.chance(1, i, &to))).collect();
         let brought: Vec<f64> = (0..n).map(|_| f64::from(rng.decades(-8.0, 8.0).abs())).collect();
