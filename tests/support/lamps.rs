@@ -49,13 +49,11 @@ fn room(seed: u32, count: usize, apart: bool, depth: u32) -> Stage {
     stage
 }
 
-/// A coarse ball that is shaded smoothly, between three hundred shining triangles that face it.
+/// A ball between three hundred shining triangles that face it.
 pub fn beside_a_ball(seed: u32, integrator: Integrator) -> Stage {
     let settings = RenderSettings { seed, ..settings(SIZE, SIZE, integrator, 1) };
     let mut stage = Stage::new(settings);
-    let mut smooth = ball(4);
-    smooth.normals = smooth.positions.clone();
-    stage.add_mesh(smooth, Material::lambert(Vec3::splat(0.8)), DAffine3::IDENTITY);
+    stage.add_mesh(ball(6), Material::lambert(Vec3::splat(0.8)), DAffine3::IDENTITY);
     let (mut rng, mut mesh) = (Rng(9), TriangleMesh::default());
     for i in 0..300 {
         let out = rng.direction();
