@@ -203,6 +203,9 @@ fn hours_of_use_leave_no_trace() {
     desktop.xdotool(["windowsize", "--sync", &program.window, "320", "240"]);
     desktop.xdotool(["key", "Escape", "key", "1", "key", "Home"]);
     pause(2500);
+    if desktop.title(&program).ends_with("- paused") {
+        desktop.xdotool(["key", "space"]);
+    }
     let last = resident(&program);
     println!(
         "{step} actions in {seconds} s: {early:.0} MiB at first, at most {most:.0}, {last:.0} at the end"

@@ -8,7 +8,7 @@ mod stage;
 
 use lamps::{SIZE, beside_a_ball, measure};
 use penumbra::trace::Integrator;
-use stage::Frames as _;
+use stage::{Estimate, Frames as _};
 
 /// The floor that was set: with ten thousand, an error of at most that of ten after three times as many samples. What
 /// they cost in time `cargo bench --bench many_lights` measures.
@@ -29,8 +29,8 @@ fn ten_thousand_are_as_good_as_ten() {
 fn however_they_are_chosen_it_is_the_same_light() {
     for depth in [1, 3] {
         let [one, many] = [false, true].map(|apart| measure(300, apart, depth, 16));
-        let sigma = one.error.hypot(many.error);
-        let (a, b) = (one.mean, many.mean);
+        let sigma = one.picture.sigma.hypot(many.picture.sigma);
+        let (a, b) = (one.picture.mean, many.picture.mean);
         println!("depth {depth}: {a:.5} and {b:.5}, ± {sigma:.5}");
         assert!((a - b).abs() < 4.5 * sigma && sigma < 0.01 * a, "depth {depth}: {a} {b} ± {sigma}");
     }
@@ -41,20 +41,16 @@ fn however_they_are_chosen_it_is_the_same_light() {
 #[test]
 fn bounces_and_light_samples_find_the_same() {
     let [light_samples, both] = [Integrator::Direct, Integrator::Path].map(|integrator| {
-        let mut means = Vec::new();
-        for seed in 0..32 {
+        let sum = |seed| {
             let mut stage = beside_a_ball(seed, integrator);
             let film = stage.trace(64);
             let row = |y| film.row(y).map(|p| p.mean().y).sum::<f64>();
-            means.push((0..SIZE).map(row).sum::<f64>());
-        }
-        let n = means.len() as f64;
-        let mean = means.iter().sum::<f64>() / n;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
-        [mean, variance]
+            (0..SIZE).map(row).sum::<f64>()
+        };
+        Estimate::of(&(0..32).map(sum).collect::<Vec<f64>>())
     });
-    let sigma = (light_samples[1] + both[1]).sqrt();
-    let off = (both[0] - light_samples[0]) / sigma;
-    println!("{:.4} and {:.4}: {off:+.2} σ of {:.1e}", light_samples[0], both[0], sigma / both[0]);
-    assert!(off.abs() < 4.5 && sigma < 3e-3 * both[0], "{off} σ");
+    let sigma = light_samples.sigma.hypot(both.sigma);
+    let off = (both.mean - light_samples.mean) / sigma;
+    println!("{:.4} and {:.4}: {off:+.2} σ of {:.1e}", light_samples.mean, both.mean, sigma / both.mean);
+    assert!(off.abs() < 4.5 && sigma < 3e-3 * both.mean, "{off} σ");
 }

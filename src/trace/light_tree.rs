@@ -270,13 +270,13 @@ impl LightTree {
 
 /// Sorts `order` into two parts, neither of which is empty; returns where the second begins.
 fn split(emitters: &[Emitter], order: &mut [u32], depth: u32) -> usize {
+    if order.len() <= 2 {
+        return 1;
+    }
     let center = |i: u32| emitters[i as usize].bounds.center();
     let bounds = order.iter().fold(Aabb::EMPTY, |bounds, &i| bounds.with(center(i)));
     let size = bounds.max - bounds.min;
     let longest = size.max_element();
-    if order.len() <= 2 {
-        return 1;
-    }
     let join = |sum: Option<Emitter>, more: Option<Emitter>| match (sum, more) {
         (Some(sum), Some(more)) => Some(sum.union(&more)),
         (sum, more) => sum.or(more),

@@ -1,7 +1,7 @@
 //! A room lit by any number of small lamps.
 #![allow(dead_code, reason = "the test and the bench each use their part")]
 
-use crate::stage::{Frames as _, Stage, ball, cube, quad, settings};
+use crate::stage::{Estimate, Frames as _, Stage, ball, cube, quad, settings};
 use glam::{DAffine3, DVec3, Vec3};
 use penumbra::scene::{Light, Material, TriangleMesh};
 use penumbra::torture::oracle::Rng;
@@ -69,10 +69,8 @@ pub fn beside_a_ball(seed: u32, integrator: Integrator) -> Stage {
 
 /// What pictures of many seeds come to.
 pub struct Measured {
-    /// Brightness of the picture.
-    pub mean: f64,
-    /// Its standard error.
-    pub error: f64,
+    /// Its mean brightness.
+    pub picture: Estimate,
     /// Variance of a pixel of one picture, relative to the squared mean.
     pub variance: f64,
     /// Of rendering one picture, without building the scene.
@@ -102,7 +100,6 @@ pub fn measure(count: usize, apart: bool, depth: u32, samples: u32) -> Measured 
     let variance: f64 =
         sums.iter().zip(&squares).map(|(s, q)| (q / n - (s / n).powi(2)) * n / (n - 1.0)).sum::<f64>()
             / pixels as f64;
-    let mean = means.iter().sum::<f64>() / n;
-    let error = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
-    Measured { mean, error, variance: variance / (mean * mean), time }
+    let picture = Estimate::of(&means);
+    Measured { picture, variance: variance / (picture.mean * picture.mean), time }
 }

@@ -264,6 +264,6 @@ pub const H8: Case = Case {
 pub const H9: Case = Case {
     id: "H9",
     title: "white and shining furnaces: energy is kept, and none is made",
-    limit: "1e-5 by pixel, or 4.5 standard errors, themselves at most 1e-3",
+    limit: "1e-5 by pixel, or 4.5 standard errors, themselves at most 1e-3 (shining rooms at all places with --long only)",
     run: furnaces,
 };
