@@ -4,7 +4,8 @@
 use glam::{DAffine3, DVec3, Vec3};
 use penumbra::bvh::{Aabb, Blas, Placement, Shaft, Tlas};
 use penumbra::trace::quad::{Quad, angle_over_sine};
-use penumbra::trace::visible::{Blocker, irradiance, join};
+use penumbra::trace::blocker::{Blocker, simplify};
+use penumbra::trace::visible::irradiance;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -181,19 +182,28 @@ fn two_triangles_of_a_wall_are_one_blocker() {
     let [a, b, c, d] = corners;
     let lamp = Vec3::new(0.0, 0.0, 2.0);
     let make = |t: [Vec3; 3]| Blocker::new(&t, lamp, Vec3::NEG_Z, 1e-6).expect("below the lamp");
-    let mut joined = vec![make([a, b, c]), make([a, c, d])];
-    let apart = joined.clone();
-    join(&mut joined, 0);
-    assert_eq!(joined.len(), 1);
+    let point = Vec3::new(0.1, -0.4, 0.0);
+    let patch = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(x, y)| point.as_dvec3() + DVec3::new(x, y, 0.0) * 0.1);
     let quad = Quad::new(Vec3::new(-0.5, -0.5, 2.0), Vec3::X, Vec3::Y);
-    let seen = |blockers: &[Blocker], which| {
-        irradiance(&quad, Vec3::new(0.1, -0.4, 0.0), [Vec3::Z; 2], blockers, which).expect("few pieces")
+    let seen = |blockers: &[Blocker]| {
+        let all = (1 << blockers.len()) - 1;
+        irradiance(&quad, point, [Vec3::Z; 2], blockers, all).expect("few pieces")
     };
-    assert!((seen(&joined, 1) - seen(&apart, 3)).abs() < 1e-6);
-    // Bent, or not convex: two.
-    for fourth in [d + Vec3::Y * 0.1, Vec3::new(0.0, 0.3, 0.2)] {
+    // Flat, or bent: what counts is what it looks like. In each order, each way round.
+    for fourth in [d, d + Vec3::Y * 0.1, d - Vec3::Y * 0.1] {
+        for [x, y] in [[[a, b, c], [a, c, fourth]], [[c, b, a], [c, fourth, a]], [[c, fourth, a], [a, b, c]]] {
+            let mut two = vec![make(x), make(y)];
+            let apart = two.clone();
+            simplify(&mut two, 0, &patch);
+            assert_eq!(two.len(), 1, "{fourth}");
+            assert!((seen(&two) - seen(&apart)).abs() < 1e-6, "{fourth}");
+        }
+    }
+    // Not convex, or seen from both sides: two.
+    for fourth in [Vec3::new(0.0, 0.3, 0.2), Vec3::new(-1.0, -0.4, 0.0)] {
         let mut two = vec![make([a, b, c]), make([a, c, fourth])];
-        join(&mut two, 0);
+        simplify(&mut two, 0, &patch);
         assert_eq!(two.len(), 2, "{fourth}");
     }
 }

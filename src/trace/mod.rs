@@ -5,6 +5,7 @@
 
 pub mod allot;
 pub mod block;
+pub mod blocker;
 pub mod bsdf;
 pub mod camera;
 mod connect;

@@ -4,12 +4,12 @@
 //! does not depend on its company.
 
 use super::TraceScene;
+use super::blocker::{Blocker, simplify};
 use super::film::Tile;
 use super::light::FlatLight;
 use super::lights::ALL_LIGHTS;
 use super::quad::Quad;
 use super::shape_light::Shape;
-use super::visible::{Blocker, join};
 use crate::bvh::{Aabb, Hit, Ray, Shaft};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 
@@ -170,7 +170,7 @@ impl Sightlines {
             self.blockers.truncate(first);
             return None;
         }
-        join(&mut self.blockers, first);
+        simplify(&mut self.blockers, first, patch);
         Some((first as u32, self.blockers.len() as u32))
     }
 }

@@ -7,12 +7,13 @@
 //! Account of Shadows and Interreflection", 1985.
 
 use super::block::{Block, LANES};
+use super::blocker::{Blocker, EDGES};
 use super::quad::{Quad, angle_over_sine};
 use crate::bvh::simd::{Job, Simd};
 use glam::Vec3;
 
-/// Most corners of a piece: four, and one for each plane that cut it.
-const CORNERS: usize = 8;
+/// Most corners of a piece: four, and at most one for each plane that cut it.
+const CORNERS: usize = 12;
 /// So many pieces may come of one lamp at one point.
 const PIECES: u32 = 64;
 /// What of the whole lamp's irradiance cuts may leave of nothing: 2⁻²³ for each of some corners.
@@ -20,63 +21,11 @@ const ROUNDING: f32 = 1e-6;
 /// Irradiance above this is more than that in any case.
 const FAINT: f32 = 4e-6;
 
-/// Something convex that is in the way: a triangle, without what is behind the lamp's plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blocker {
-    corners: [Vec3; 4],
-    count: usize,
-}
-
 /// A convex polygon as seen from a point, by its corners relative to it.
 #[derive(Clone, Copy)]
 struct Piece {
     corners: [Vec3; CORNERS],
     count: usize,
-}
-
-impl Blocker {
-    /// What of the triangle is above the plane through `on` with `normal` by more than `tolerance`, in units of both; `None`
-    /// if nothing is.
-    #[must_use]
-    pub fn new(triangle: &[Vec3; 3], on: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
-        // In double precision, and corners that stay keep all their digits: a thousandth above the floor they count.
-        let height = |p: Vec3| normal.as_dvec3().dot(p.as_dvec3() - on.as_dvec3());
-        if !triangle.iter().any(|p| height(*p) > f64::from(tolerance)) {
-            return None;
-        }
-        let (mut corners, mut count) = ([Vec3::ZERO; 4], 0);
-        let mut push = |p: Vec3| {
-            if count < corners.len() {
-                corners[count] = p;
-                count += 1;
-            }
-        };
-        for i in 0..3 {
-            let (here, next) = (triangle[i], triangle[(i + 1) % 3]);
-            let (above, above_next) = (height(here), height(next));
-            if above > 0.0 {
-                push(here);
-            }
-            if (above > 0.0) != (above_next > 0.0) {
-                push(here.as_dvec3().lerp(next.as_dvec3(), above / (above - above_next)).as_vec3());
-            }
-        }
-        (count > 2).then_some(Self { corners, count })
-    }
-}
-
-/// Makes one of each two triangles that make a flat convex quadrilateral: most that people build are made of such.
-pub fn join(blockers: &mut Vec<Blocker>, first: usize) {
-    let mut i = first;
-    while i < blockers.len() {
-        if let Some((k, joined)) =
-            (i + 1..blockers.len()).find_map(|k| Some((k, blockers[i].joined(&blockers[k])?)))
-        {
-            blockers[i] = joined;
-            blockers.swap_remove(k);
-        }
-        i += 1;
-    }
 }
 
 /// Irradiance at `point` with the first of `normals` from radiance 1 of what of `quad` is above both horizons and behind
@@ -101,7 +50,7 @@ pub fn irradiance(
     }
     // Nothing cuts it: to the bit what it is where nobody asks.
     let reached =
-        |i: u32| which >> i & 1 == 1 && blockers[i as usize].reaches(&piece, point, &mut [Vec3::ZERO; 4]);
+        |i: u32| which >> i & 1 == 1 && blockers[i as usize].reaches(&piece, point, &mut [Vec3::ZERO; EDGES]);
     let all_above = quad.is_above(point, normal) && quad.is_above(point, geometric);
     if all_above && !(0..blockers.len() as u32).any(reached) {
         return Some(quad.irradiance(point, normal).abs());
@@ -127,7 +76,7 @@ fn seen(
     while which != 0 {
         let blocker = &blockers[which.trailing_zeros() as usize];
         which &= which - 1;
-        let mut planes = [Vec3::ZERO; 4];
+        let mut planes = [Vec3::ZERO; EDGES];
         // Outside of one of them is out of its reach: most are.
         if !blocker.reaches(&piece, point, &mut planes) {
             continue;
@@ -176,25 +125,31 @@ impl Job for Reach<'_> {
         let lamp = quad.corners();
         *out = [0; LANES];
         for (number, blocker) in (0..u32::BITS).zip(blockers) {
-            let [a, b, c, d] = blocker.corners;
-            let triangle = blocker.count == 3;
-            for (i, which) in out.iter_mut().enumerate() {
-                let point = block.position.get(i);
-                let (a, b, c, d) = (a - point, b - point, c - point, d - point);
-                let lamp = [lamp[0] - point, lamp[1] - point, lamp[2] - point, lamp[3] - point];
-                let first = a.cross(b);
-                let side = first.dot(c);
-                let sign = if side > 0.0 { 1.0 } else { -1.0 };
-                let far = size(lamp[0]) + size(lamp[2]);
-                let (out_0, in_0) = sides(first * sign, size(a) * size(b) * far, &lamp);
-                let (out_1, in_1) = sides(b.cross(c) * sign, size(b) * size(c) * far, &lamp);
-                let last = if triangle { a } else { d };
-                let (out_2, in_2) = sides(c.cross(last) * sign, size(c) * size(last) * far, &lamp);
-                let (out_3, in_3) = sides(d.cross(a) * sign, size(d) * size(a) * far, &lamp);
-                let outside = out_0 | out_1 | out_2 | (out_3 & !triangle);
-                let inside = in_0 & in_1 & in_2 & (in_3 | triangle) & !outside;
-                let bit = if outside { 0 } else { 1 << number };
-                *which |= if inside { HIDDEN } else { bit };
+            let corners = blocker.corners();
+            let mut sign = [1.0; LANES];
+            if !blocker.turned {
+                for (i, sign) in sign.iter_mut().enumerate() {
+                    let point = block.position.get(i);
+                    let (a, b, c) = (corners[0] - point, corners[1] - point, corners[2] - point);
+                    *sign = if a.cross(b).dot(c) > 0.0 { 1.0 } else { -1.0 };
+                }
+            }
+            let (mut outside, mut inside) = ([false; LANES], [true; LANES]);
+            for (k, &corner) in corners.iter().enumerate() {
+                let next = corners[(k + 1) % corners.len()];
+                for i in 0..LANES {
+                    let point = block.position.get(i);
+                    let (a, b) = (corner - point, next - point);
+                    let lamp = [lamp[0] - point, lamp[1] - point, lamp[2] - point, lamp[3] - point];
+                    let far = size(lamp[0]) + size(lamp[2]);
+                    let (is_outside, is_inside) = sides(a.cross(b) * sign[i], size(a) * size(b) * far, &lamp);
+                    outside[i] |= is_outside;
+                    inside[i] &= is_inside;
+                }
+            }
+            for i in 0..LANES {
+                let bit = if outside[i] { 0 } else { 1 << number };
+                out[i] |= if inside[i] & !outside[i] { HIDDEN } else { bit };
             }
         }
     }
@@ -217,61 +172,34 @@ fn sides(plane: Vec3, scale: f32, lamp: &[Vec3; 4]) -> (bool, bool) {
 }
 
 impl Blocker {
-    /// Both in one, if they are triangles that make a flat convex quadrilateral.
-    fn joined(&self, other: &Self) -> Option<Self> {
-        if self.count != 3 || other.count != 3 {
-            return None;
-        }
-        // a and b of this one's edge, from any of its corners on; the other has it the other way round or the same.
-        (0..3).find_map(|i| {
-            let [a, b, c] = [0, 1, 2].map(|k| self.corners[(i + k) % 3]);
-            let third = other.corners[..3].iter().find(|p| **p != a && **p != b)?;
-            let shared = |p: Vec3| other.corners[..3].contains(&p);
-            if !shared(a) || !shared(b) {
-                return None;
-            }
-            let corners = [a, *third, b, c];
-            let turns = [0, 1, 2, 3].map(|k| {
-                let [p, q, r] = [0, 1, 2].map(|m| corners[(k + m) % 4].as_dvec3());
-                (q - p).cross(r - q)
-            });
-            let normal = turns[1];
-            // The fourth corner is as near to the others' plane as f32 can say, and all turns go one way.
-            let off = normal.dot((third - a).as_dvec3()).abs();
-            let size = normal.length() * (c - a).as_dvec3().length();
-            let flat = turns.iter().all(|turn| turn.dot(normal) > 0.0) && off <= 1e-6 * size;
-            flat.then_some(Self { corners, count: 4 })
-        })
-    }
-
     /// Whether it may hide some of the piece. Then `planes` are the inward normals of those through `point` and its
     /// edges.
-    fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; 4]) -> bool {
+    fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; EDGES]) -> bool {
         // Close to an edge the plane through it would be mostly rounding in single precision.
         let point = point.as_dvec3();
-        let [a, b, c, d] = self.corners.map(|p| p.as_dvec3() - point);
-        let first = a.cross(b);
-        let side = first.dot(c);
-        // Seen edge-on.
-        if side == 0.0 {
-            return false;
+        let corners = self.corners();
+        let first = corners[0].as_dvec3() - point;
+        let mut here = first;
+        let mut sign = 1.0;
+        for (i, plane) in planes[..self.count].iter_mut().enumerate() {
+            let next = corners.get(i + 1).map_or(first, |p| p.as_dvec3() - point);
+            let mut across = here.cross(next);
+            if i == 0 && !self.turned {
+                let side = across.dot(corners[2].as_dvec3() - point);
+                // Seen edge-on.
+                if side == 0.0 {
+                    return false;
+                }
+                sign = side.signum();
+            }
+            across *= sign;
+            *plane = across.as_vec3();
+            if piece.is_outside(*plane) {
+                return false;
+            }
+            here = next;
         }
-        let sign = side.signum();
-        planes[0] = (first * sign).as_vec3();
-        if piece.is_outside(planes[0]) {
-            return false;
-        }
-        planes[1] = (b.cross(c) * sign).as_vec3();
-        if piece.is_outside(planes[1]) {
-            return false;
-        }
-        if self.count == 3 {
-            planes[2] = (c.cross(a) * sign).as_vec3();
-            return !piece.is_outside(planes[2]);
-        }
-        planes[2] = (c.cross(d) * sign).as_vec3();
-        planes[3] = (d.cross(a) * sign).as_vec3();
-        !piece.is_outside(planes[2]) && !piece.is_outside(planes[3])
+        true
     }
 }
 
