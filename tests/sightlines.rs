@@ -3,8 +3,8 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 use penumbra::bvh::{Aabb, Blas, Placement, Shaft, Tlas};
-use penumbra::trace::quad::{Quad, angle_over_sine};
 use penumbra::trace::blocker::{Blocker, simplify};
+use penumbra::trace::quad::{Quad, angle_over_sine};
 use penumbra::trace::visible::irradiance;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -192,7 +192,8 @@ fn two_triangles_of_a_wall_are_one_blocker() {
     };
     // Flat, or bent: what counts is what it looks like. In each order, each way round.
     for fourth in [d, d + Vec3::Y * 0.1, d - Vec3::Y * 0.1] {
-        for [x, y] in [[[a, b, c], [a, c, fourth]], [[c, b, a], [c, fourth, a]], [[c, fourth, a], [a, b, c]]] {
+        for [x, y] in [[[a, b, c], [a, c, fourth]], [[c, b, a], [c, fourth, a]], [[c, fourth, a], [a, b, c]]]
+        {
             let mut two = vec![make(x), make(y)];
             let apart = two.clone();
             simplify(&mut two, 0, &patch);

@@ -208,32 +208,46 @@ impl Job for SampleQuad<'_> {
         let Self { block, quad, radiance, two_sided, dimension, shared, out } = self;
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         block.samplers.pairs(dimension, &mut x, &mut y);
-        let sharing = f32::from(u8::from(shared));
-        for i in 0..LANES {
-            let (point, normal) = (block.position.get(i), block.normal.get(i));
-            let place = quad.brightness(point, normal).sample(Vec2::new(x[i], y[i]));
-            let on_light = quad.at(&place);
-            let d = on_light - point;
-            let distance2 = d.length_squared();
-            let height = (point - quad.corner).dot(quad.normal);
-            let facing = if height > 0.0 { quad.normal } else { -quad.normal };
-            let slope = normal.dot(d);
-            let lit = (height > 0.0) | (two_sided & (height < 0.0));
-            let lit =
-                lit & (slope > 0.0) & (block.geometric_normal.get(i).dot(d) > 0.0) & (place.density > 0.0);
-            let height = height.abs();
-            let irradiance = (slope / distance2) * (height / distance2) * (quad.area / place.density);
-            // The power heuristic: density of the bounce over that of this sample.
-            let ratio = irradiance * (1.0 / PI) * sharing;
-            let weight = irradiance * (1.0 / PI) / (1.0 + ratio * ratio);
-            let left = radiance[0] + (radiance[2] - radiance[0]) * place.b;
-            let right = radiance[1] + (radiance[3] - radiance[1]) * place.b;
-            let brought = block.throughput.get(i) * (left + (right - left) * place.a) * weight;
-            let brought = if lit { brought } else { Vec3::ZERO };
-            out.contribution.set(i, if out.certain[i] { out.contribution.get(i) } else { brought });
-            out.target.set(i, offset(on_light, error_of(on_light), facing));
-            out.near[i] = quad.is_near(point) & !out.certain[i];
-        }
+        sample_quad([&x, &y], block, quad, radiance, [two_sided, shared], out);
+    }
+}
+
+/// References of its own: of those in a struct the compiler does not know that they are of different things, and makes no
+/// vectors.
+#[inline(always)]
+fn sample_quad(
+    [x, y]: [&Row; 2],
+    block: &Block,
+    quad: &Quad,
+    radiance: &[Vec3; 4],
+    [two_sided, shared]: [bool; 2],
+    out: &mut Arrivals,
+) {
+    let sharing = f32::from(u8::from(shared));
+    for i in 0..LANES {
+        let (point, normal) = (block.position.get(i), block.normal.get(i));
+        let place = quad.brightness(point, normal).sample(Vec2::new(x[i], y[i]));
+        let on_light = quad.at(&place);
+        let d = on_light - point;
+        let distance2 = d.length_squared();
+        let height = (point - quad.corner).dot(quad.normal);
+        let facing = if height > 0.0 { quad.normal } else { -quad.normal };
+        let slope = normal.dot(d);
+        let lit = (height > 0.0) | (two_sided & (height < 0.0));
+        let lit = lit & (slope > 0.0) & (block.geometric_normal.get(i).dot(d) > 0.0) & (place.density > 0.0);
+        let height = height.abs();
+        let irradiance = (slope / distance2) * (height / distance2) * (quad.area / place.density);
+        // The power heuristic: density of the bounce over that of this sample.
+        let ratio = irradiance * (1.0 / PI) * sharing;
+        let weight = irradiance * (1.0 / PI) / (1.0 + ratio * ratio);
+        let left = radiance[0] + (radiance[2] - radiance[0]) * place.b;
+        let right = radiance[1] + (radiance[3] - radiance[1]) * place.b;
+        let brought = block.throughput.get(i) * (left + (right - left) * place.a) * weight;
+        let brought = if lit { brought } else { Vec3::ZERO };
+        let (certain, before) = (out.certain[i], out.contribution.get(i));
+        out.contribution.set(i, if certain { before } else { brought });
+        out.target.set(i, offset(on_light, error_of(on_light), facing));
+        out.near[i] = quad.is_near(point) & !certain;
     }
 }
 

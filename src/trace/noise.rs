@@ -8,8 +8,10 @@
 //! (by 0.6 at 16 samples in the Cornell box).
 
 use super::Film;
+use super::film::Pixel;
 use crate::scene::color::luminance;
 use glam::{DVec3, UVec2};
+use rayon::prelude::*;
 
 /// How far from a pixel its surroundings reach.
 const AROUND: usize = 3;
@@ -41,15 +43,17 @@ pub fn relative_noise(film: &Film) -> Option<f64> {
 pub fn estimate(film: &Film) -> Option<Noise> {
     let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
     let size = film.size();
-    let count = size.element_product() as usize;
-    let (mut picture, mut errors) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    for y in 0..size.y {
-        for pixel in film.row(y) {
+    let row = |y: u32| -> Option<(Vec<f64>, Vec<f64>)> {
+        let halves = |pixel: &Pixel| {
             let (a, b) = (brightness(pixel.half_mean(0)?), brightness(pixel.half_mean(1)?));
-            picture.push(brightness(pixel.mean()));
-            errors.push(0.5 * (a - b));
-        }
-    }
+            let [in_a, in_b] = pixel.counts().map(f64::from);
+            Some(((a * in_a + b * in_b) / (in_a + in_b), 0.5 * (a - b)))
+        };
+        film.row(y).map(halves).collect()
+    };
+    let rows: Vec<_> = (0..size.y).into_par_iter().map(row).collect::<Option<_>>()?;
+    let (picture, errors): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+    let (picture, errors) = (picture.concat(), errors.concat());
     let squares = squares(&errors, &picture, size)?;
     let (sum, fourth) = squares.iter().fold((0.0, 0.0), |(sum, fourth), x| (sum + x, fourth + x * x));
     let relative = (sum / squares.len() as f64).sqrt();

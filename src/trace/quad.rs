@@ -166,7 +166,8 @@ impl Brightness {
         let [f00, f10, f01, f11] = self.corners;
         let sum = self.sum();
         let here = (f00 + (f10 - f00) * a) * (1.0 - b) + (f01 + (f11 - f01) * a) * b;
-        if sum > 0.0 { 4.0 * here / sum } else { 0.0 }
+        let density = 4.0 * here / sum;
+        if sum > 0.0 { density } else { 0.0 }
     }
 
     /// The place for two numbers in [0, 1), evenly distributed.
@@ -185,7 +186,8 @@ impl Brightness {
 fn corner(height: f32, nearest: f32, distance2: f32) -> f32 {
     let ratio = nearest / distance2;
     // A corner at the very point gives NaN, and counts as dark.
-    if height > 0.0 && ratio > 0.0 { height * (ratio * ratio) } else { 0.0 }
+    let brought = height * (ratio * ratio);
+    if (height > 0.0) & (ratio > 0.0) { brought } else { 0.0 }
 }
 
 /// A number in 0..=1 with a density that goes linearly from `at_0` to `at_1`.

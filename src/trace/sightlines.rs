@@ -45,6 +45,8 @@ pub(super) struct Window {
 
 /// So many triangles in the way are too many.
 const FEW: usize = 16;
+/// So many are looked at, since together they may be few outlines.
+const LOOKED_AT: usize = 32;
 /// So many triangles in view are remembered.
 const MANY: usize = 32;
 
@@ -159,18 +161,28 @@ impl Sightlines {
             return None;
         }
         let tolerance = 1e-6 * quad.corners().iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
+        let on_patch = 3e-7 * patch.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let up = normal.normalize();
         let few = scene.geometry.tlas.blockers(&shaft, |instance, triangle| {
+            // Below the horizon, or in the same plane: nothing is in the way.
+            if triangle.iter().all(|p| up.dot(p.as_dvec3() - patch[0]) <= on_patch) {
+                return true;
+            }
             if scene.coverage.alpha.get(instance as usize).copied().unwrap_or(false) {
                 return false;
             }
             self.blockers.extend(Blocker::new(&triangle, quad.corner, facing, tolerance));
-            self.blockers.len() - first <= FEW
+            self.blockers.len() - first <= LOOKED_AT
         });
         if !few {
             self.blockers.truncate(first);
             return None;
         }
         simplify(&mut self.blockers, first, patch);
+        if self.blockers.len() - first > FEW {
+            self.blockers.truncate(first);
+            return None;
+        }
         Some((first as u32, self.blockers.len() as u32))
     }
 }

@@ -12,8 +12,8 @@ use super::quad::{Quad, angle_over_sine};
 use crate::bvh::simd::{Job, Simd};
 use glam::Vec3;
 
-/// Most corners of a piece: four, and at most one for each plane that cut it.
-const CORNERS: usize = 12;
+/// Most corners of a piece: four, and at most one more for each plane that cut it: two horizons and those of one blocker.
+const CORNERS: usize = 6 + EDGES;
 /// So many pieces may come of one lamp at one point.
 const PIECES: u32 = 64;
 /// What of the whole lamp's irradiance cuts may leave of nothing: 2⁻²³ for each of some corners.
@@ -48,17 +48,34 @@ pub fn irradiance(
     if geometric != normal {
         piece = piece.inside(geometric);
     }
-    // Nothing cuts it: to the bit what it is where nobody asks.
-    let reached =
-        |i: u32| which >> i & 1 == 1 && blockers[i as usize].reaches(&piece, point, &mut [Vec3::ZERO; EDGES]);
-    let all_above = quad.is_above(point, normal) && quad.is_above(point, geometric);
-    if all_above && !(0..blockers.len() as u32).any(reached) {
-        return Some(quad.irradiance(point, normal).abs());
-    }
-    let sum = seen(piece, normal, point, blockers, which, &mut budget).abs();
+    let whole = || {
+        // To the bit what it is where nobody asks.
+        let all_above = quad.is_above(point, normal) && quad.is_above(point, geometric);
+        if all_above { quad.irradiance(point, normal).abs() } else { piece.irradiance(normal).abs() }
+    };
+    let mut planes = [[Vec3::ZERO; EDGES]; 2];
+    let mut cutting = (0..blockers.len()).filter(|&i| which >> i & 1 == 1);
+    let Some(first) = cutting.find(|&i| blockers[i].reaches(&piece, point, &mut planes[0])) else {
+        return Some(whole());
+    };
+    let sum = if cutting.any(|i| blockers[i].reaches(&piece, point, &mut planes[1])) {
+        seen(piece, normal, point, blockers, which & (u32::MAX << first), &mut budget).abs()
+    } else {
+        whole() - hidden(piece, normal, &planes[0][..blockers[first].count])
+    };
     // Where blockers hide all of it by a hair, cutting leaves slivers of nothing but rounding.
-    let is_dark = sum < FAINT && piece.count > 2 && sum <= ROUNDING * piece.irradiance(normal).abs();
-    (budget > 0).then_some(if is_dark { 0.0 } else { sum })
+    let is_dark = sum < FAINT && piece.count > 2 && sum <= ROUNDING * whole();
+    (budget > 0).then_some(if is_dark { 0.0 } else { sum.max(0.0) })
+}
+
+/// From what of `piece` is inside of all of some planes.
+fn hidden(mut piece: Piece, normal: Vec3, planes: &[Vec3]) -> f32 {
+    for plane in planes {
+        if !piece.is_inside(*plane) {
+            piece = piece.inside(*plane);
+        }
+    }
+    piece.irradiance(normal).abs()
 }
 
 /// From what of `piece` is behind none of `blockers`.
@@ -212,6 +229,12 @@ impl Piece {
         self.corners[..self.count].iter().all(|p| plane.dot(*p) <= 0.0)
     }
 
+    /// Whether all corners are inside.
+    #[inline]
+    fn is_inside(&self, plane: Vec3) -> bool {
+        self.corners[..self.count].iter().all(|p| plane.dot(*p) > 0.0)
+    }
+
     /// What is on the side to which `plane`, a normal, points.
     fn inside(&self, plane: Vec3) -> Self {
         let (mut inside, mut outside) = (Self::EMPTY, Self::EMPTY);
@@ -258,7 +281,7 @@ impl Piece {
     /// By the sum over its edges; its sign is that of the corners' sense of rotation.
     fn irradiance(&self, normal: Vec3) -> f32 {
         let corners = &self.corners[..self.count];
-        let mut before = corners[self.count - 1];
+        let Some(&(mut before)) = corners.last() else { return 0.0 };
         let mut length_before = before.length();
         let mut sum = 0.0;
         for &here in corners {

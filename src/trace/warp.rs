@@ -92,7 +92,7 @@ fn outward(p: f32, n: f32) -> f32 {
     let stepped = if away { bits.wrapping_add(1) } else { bits.wrapping_sub(1) };
     // From either zero to the least number of that sign.
     let stepped = if p == 0.0 { n.to_bits() & (1 << 31) | 1 } else { stepped };
-    if n == 0.0 || !p.is_finite() { p } else { f32::from_bits(stepped) }
+    if (n == 0.0) | !p.is_finite() { p } else { f32::from_bits(stepped) }
 }
 
 #[cfg(test)]
