@@ -201,12 +201,70 @@ fn two_triangles_of_a_wall_are_one_blocker() {
             assert!((seen(&two) - seen(&apart)).abs() < 1e-6, "{fourth}");
         }
     }
-    // Not convex, or seen from both sides: two.
-    for fourth in [Vec3::new(0.0, 0.3, 0.2), Vec3::new(-1.0, -0.4, 0.0)] {
+    // Not convex, or seen from both sides: two. What lies in another is none.
+    for fourth in [Vec3::new(1.2, 0.3, 1.5), Vec3::new(1.2, -1.1, 0.0)] {
         let mut two = vec![make([a, b, c]), make([a, c, fourth])];
         simplify(&mut two, 0, &patch);
         assert_eq!(two.len(), 2, "{fourth}");
     }
+    let mut two = vec![make([a, b, c]), make([a, c, Vec3::new(0.0, 0.3, 0.2)])];
+    simplify(&mut two, 0, &patch);
+    assert_eq!(two.len(), 1);
+    assert!((seen(&two) - seen(&[make([a, b, c])])).abs() < 1e-7);
+}
+
+/// Boxes and other bodies that stand between a patch and a lamp: as few outlines as they are, all points of the patch see
+/// of the lamp what they saw of it past each triangle.
+#[test]
+fn outlines_hide_what_their_triangles_hide() {
+    let mut rng = Rng(5);
+    let (mut worst, mut partly, mut before, mut after, mut caught) = (0.0_f64, 0, 0, 0, 0);
+    for _ in 0..300 {
+        let quad = Quad::new(Vec3::new(-0.6, -0.5, 2.5), Vec3::new(1.2, 0.1, 0.1), Vec3::new(0.0, 1.0, -0.1));
+        let place = DAffine3::from_scale_rotation_translation(
+            rng.point(DVec3::splat(0.05), DVec3::new(0.4, 0.4, 0.6)),
+            glam::DQuat::from_rotation_z(rng.unit() * PI) * glam::DQuat::from_rotation_x(rng.unit()),
+            rng.point(DVec3::new(-0.4, -0.4, 0.9), DVec3::new(0.4, 0.4, 1.4)),
+        );
+        let corner = |i: usize| {
+            let side = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            place.transform_point3(DVec3::new(side(0), side(1), side(2))).as_vec3()
+        };
+        let facing = -quad.normal;
+        let of = |t: [usize; 3]| Blocker::new(&t.map(corner), quad.corner, facing, 1e-6);
+        let faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+        let triangles = faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]);
+        let apart: Vec<Blocker> = triangles.filter_map(of).collect();
+        let middle = rng.point(DVec3::new(-0.5, -0.5, -0.1), DVec3::new(0.5, 0.5, 0.1));
+        let size = 0.05;
+        let patch = [(-size, -size), (size, -size), (size, size), (-size, size)]
+            .map(|(x, y)| middle + DVec3::new(x, y, 0.1 * x));
+        let mut outlines = apart.clone();
+        simplify(&mut outlines, 0, &patch);
+        (before, after) = (before + apart.len(), after + outlines.len());
+        for _ in 0..20 {
+            let point = on(&mut rng, patch).as_vec3();
+            let seen = |blockers: &[Blocker]| {
+                let all = (1 << blockers.len()) - 1;
+                irradiance(&quad, point, [Vec3::Z; 2], blockers, all).map(f64::from)
+            };
+            // In a dozen triangles the lamp may fall to too many pieces.
+            let (Some(whole), Some(expected)) = (seen(&[]), seen(&apart)) else { continue };
+            let difference =
+                |outlines: &[Blocker]| (expected - seen(outlines).expect("few pieces")).abs() / whole;
+            worst = worst.max(difference(&outlines));
+            if (0.02..0.98).contains(&(expected / whole)) {
+                partly += 1;
+                // The same test sees one that is left out, if no other hides the same.
+                caught += u32::from(difference(&outlines[1..]) > 1e-4);
+            }
+        }
+    }
+    println!(
+        "{before} triangles, {after} outlines; worst difference {worst:.1e} of the lamp; {partly} partly, {caught} caught"
+    );
+    assert!(worst < 4e-6, "{worst:e}");
+    assert!(after * 4 < before && partly > 1000 && caught * 2 > partly);
 }
 
 /// A patch of a floor, a lamp, and something between or beside them.

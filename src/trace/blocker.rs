@@ -94,23 +94,30 @@ impl Blocker {
         })
     }
 
-    /// Both in one, if they have an edge in common and look convex from all of `patch`.
-    fn merged(&self, other: &Self, patch: &[DVec3]) -> Option<Self> {
-        let (here, there) = (self.corners(), other.corners());
-        let total = here.len() + there.len() - 2;
-        if total > EDGES {
+    /// Whether they have an edge in common, on either side of which they are.
+    fn touches(&self, other: &Self) -> bool {
+        self.edges().any(|(a, b)| other.edges().any(|edge| edge == (b, a)))
+    }
+
+    /// All in one, if what is around those, who hang together and go around counterclockwise, looks convex from all of `patch`.
+    ///
+    /// A convex rim once around, parts of one orientation, none with a corner outside: they cover the inside, each place once.
+    fn around(parts: &[Self], patch: &[DVec3]) -> Option<Self> {
+        let edges = || parts.iter().flat_map(Self::edges);
+        let mut rim: Vec<_> = edges().filter(|&(a, b)| !edges().any(|edge| edge == (b, a))).collect();
+        if !(3..=EDGES).contains(&rim.len()) {
             return None;
         }
-        let (i, j) = (0..here.len()).find_map(|i| {
-            let edge = (here[(i + 1) % here.len()], here[i]);
-            (0..there.len()).find(|&j| (there[j], there[(j + 1) % there.len()]) == edge).map(|j| (i, j))
-        })?;
         let mut out = Self { corners: [Vec3::ZERO; EDGES], count: 0, turned: true };
-        // All of this one from behind the edge on; then what of the other one is not on it.
-        (1..=here.len()).for_each(|k| out.push(here[(i + k) % here.len()]));
-        (2..there.len()).for_each(|k| out.push(there[(j + k) % there.len()]));
-        let is_simple = (0..total).all(|k| !out.corners[..k].contains(&out.corners[k]));
-        (is_simple && out.covers(&out, patch)).then_some(out)
+        let (first, mut end) = rim.swap_remove(0);
+        out.push(first);
+        while let Some(next) = rim.iter().position(|edge| edge.0 == end) {
+            out.push(end);
+            end = rim.swap_remove(next).1;
+        }
+        let is_simple = (0..out.count).all(|k| !out.corners[..k].contains(&out.corners[k]));
+        let is_convex = rim.is_empty() && end == first && is_simple && out.covers(&out, patch);
+        (is_convex && parts.iter().all(|part| out.covers(part, patch))).then_some(out)
     }
 }
 
@@ -133,22 +140,26 @@ pub fn simplify(blockers: &mut Vec<Blocker>, first: usize, patch: &[DVec3]) {
             None => others.push(blocker),
         }
     }
-    let mut i = 0;
-    while i < outlines.len() {
-        let grown = (0..outlines.len())
-            .filter(|&k| k != i)
-            .find_map(|k| Some((k, outlines[i].merged(&outlines[k], patch)?)));
-        match grown {
-            Some((k, merged)) => {
-                outlines[i] = merged;
-                outlines.swap_remove(k);
-                i = 0;
-            }
-            None => i += 1,
+    // Whole bodies first: of three faces that meet in a corner no two look convex.
+    let mut merged = Vec::new();
+    while let Some(part) = outlines.pop() {
+        let mut body = vec![part];
+        let mut i = 0;
+        while i < body.len() {
+            let (near, far) = outlines.into_iter().partition(|other| body[i].touches(other));
+            body.extend::<Vec<_>>(near);
+            outlines = far;
+            i += 1;
+        }
+        match Blocker::around(&body, patch) {
+            Some(outline) => merged.push(outline),
+            None => merge_pairs(body, patch, &mut merged),
         }
     }
+    let mut outlines = merged;
     let mut i = 0;
     while i < outlines.len() {
+        // The same outline from front and back, or what is behind another.
         if (0..outlines.len()).any(|k| k != i && outlines[k].covers(&outlines[i], patch)) {
             outlines.swap_remove(i);
         } else {
@@ -157,4 +168,23 @@ pub fn simplify(blockers: &mut Vec<Blocker>, first: usize, patch: &[DVec3]) {
     }
     blockers.append(&mut outlines);
     blockers.append(&mut others);
+}
+
+/// Merges any two that can be, as long as there are some.
+fn merge_pairs(mut parts: Vec<Blocker>, patch: &[DVec3], out: &mut Vec<Blocker>) {
+    while let Some(mut part) = parts.pop() {
+        let mut i = 0;
+        while i < parts.len() {
+            let pair = [part, parts[i]];
+            match if part.touches(&pair[1]) { Blocker::around(&pair, patch) } else { None } {
+                Some(merged) => {
+                    part = merged;
+                    parts.swap_remove(i);
+                    i = 0;
+                }
+                None => i += 1,
+            }
+        }
+        out.push(part);
+    }
 }
