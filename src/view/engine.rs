@@ -202,7 +202,10 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 view_changed_at = Instant::now();
             }
             let held = app.world.resource::<Input>().is_moving();
+            // A frame that was cut off has shown nothing, and what cut it off may have been read before.
+            let cut_off = self.interrupt.load(Ordering::SeqCst);
             idle = !held
+                && !cut_off
                 && (stats.done || app.world.resource::<Paused>().0)
                 && !app.world.resource::<Pending>().0;
             self.say(app);
@@ -346,3 +349,6 @@ pub fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("panic without a message").to_owned()
 }
+
+#[cfg(test)]
+mod tests;

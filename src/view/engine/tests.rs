@@ -1,0 +1,69 @@
+//! The engine without a window.
+
+use super::super::input::Press;
+use super::*;
+use crate::app::FrameSystems;
+use crate::load::LoadOptions;
+use crate::open::{Wishes, open};
+use bevy_ecs::prelude::{IntoScheduleConfigs, Res};
+use glam::UVec2;
+use std::sync::mpsc::channel;
+
+/// Raises the interrupt in every frame that a key changes, as a window does that is slow to raise it after its command.
+fn raise_late(input: Res<Input>, budget: Res<FrameBudget>) {
+    if !input.taps.is_empty() {
+        budget.interrupt.store(true, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn an_interrupt_that_comes_late_keeps_no_picture_back() {
+    let (commands, received) = channel();
+    let published = Arc::new(Mutex::new(Published::default()));
+    let engine = Engine {
+        scene: "cornell".to_owned(),
+        reference: None,
+        commands: received,
+        own: commands.clone(),
+        interrupt: Arc::default(),
+        published: Arc::clone(&published),
+        wake: |_| (),
+    };
+    let engine = std::thread::spawn(move || {
+        engine.run(|_| {
+            let wishes = Wishes { size: Some(UVec2::new(32, 24)), samples: Some(2), ..Wishes::default() };
+            let source = SceneSource::parse("cornell").map_err(|e| e.to_string())?;
+            let mut app = open(&source, &LoadOptions::default(), &wishes).map_err(|e| e.to_string())?.app;
+            app.world.resource_mut::<FrameBudget>().sample_target = 2;
+            app.add_systems(raise_late.in_set(FrameSystems::Update));
+            Ok(app)
+        });
+    });
+    // The picture as soon as all samples are there and `is_wanted`.
+    let wait = |is_wanted: &dyn Fn(&[u8]) -> bool| {
+        let start = Instant::now();
+        let mut last = Vec::new();
+        while start.elapsed() < Duration::from_secs(20) {
+            let mut published = lock(&published);
+            if let Some(picture) = published.picture.take() {
+                last = picture.rgba;
+            }
+            if published.status.as_ref().is_some_and(|s| s.done) && !last.is_empty() && is_wanted(&last) {
+                return Some(last);
+            }
+            drop(published);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        None
+    };
+    let beauty = wait(&|_| true).unwrap();
+    let view = |shift| Command::Tap { press: Press { shift, ..Press::from(Tap::PixelView) }, at: Instant::now() };
+    for _ in 0..3 {
+        commands.send(view(false)).unwrap();
+        assert!(wait(&|rgba| *rgba != *beauty).is_some(), "the noise is not shown");
+        commands.send(view(true)).unwrap();
+        assert!(wait(&|rgba| *rgba == *beauty).is_some(), "the light is not shown again");
+    }
+    commands.send(Command::Quit).unwrap();
+    engine.join().unwrap();
+}
