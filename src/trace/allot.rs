@@ -9,7 +9,7 @@ use crate::scene::color::luminance;
 use glam::DVec3;
 
 /// Even samples per pixel before shares are given out.
-pub const EVEN: u32 = 2;
+pub const EVEN: u32 = 3;
 /// Nobody gets less than this share, or more than that many: what the first samples have missed must have its
 /// chance.
 const LEAST: f64 = 0.05;
@@ -99,7 +99,7 @@ const AROUND: [(i64, i64, f64); 16] = [
     (1, -2, FAR),
     (1, 2, FAR),
 ];
-const FAR: f64 = 0.01;
+const FAR: f64 = 0.1;
 /// What a step between two neighbours counts, squared: an edge goes through the pixel, perhaps just so that all halves
 /// agree (a net has as many samples on either side of its middle).
 const EDGE: f64 = 0.06;
