@@ -267,6 +267,37 @@ fn outlines_hide_what_their_triangles_hide() {
     assert!(after * 4 < before && partly > 1000 && caught * 2 > partly);
 }
 
+/// A wall whose top is at the lamp's height, a hair above or below it: whichever corner its triangles begin with.
+#[test]
+fn a_wall_up_to_the_lamps_height_hides_all_that_it_hides() {
+    let quad = Quad::new(Vec3::new(-0.5, -0.5, 2.0), Vec3::X, Vec3::Y);
+    let point = DVec3::new(1.0, 0.1, 0.0);
+    let patch = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(x, y)| point + DVec3::new(x, y, 0.0) * 0.1);
+    for top in [2.0f32, 2.0f32.next_up(), 2.0f32.next_down(), 2.0 - 1e-5, 2.0 + 1e-5, 2.5, 1.9] {
+        let [a, b, c, d] = [(-2.0, 0.0), (2.0, 0.0), (2.0, f64::from(top)), (-2.0, f64::from(top))]
+            .map(|(y, z)| DVec3::new(0.3, y, z));
+        for turn in 0..6 {
+            let order = |t: [DVec3; 3]| {
+                let [x, y, z] = [0, 1, 2].map(|k| t[(k + turn) % 3]);
+                if turn < 3 { [x, y, z] } else { [x, z, y] }
+            };
+            let triangles = vec![order([a, b, c]), order([a, c, d])];
+            let case = Case { quad, point, normal: DVec3::Z, triangles };
+            let (seen, all) = case.counted();
+            assert!(seen > 0.1 * all && seen < 0.6 * all, "partly");
+            let mut blockers = case.blockers();
+            for merged in [false, true] {
+                if merged {
+                    simplify(&mut blockers, 0, &patch);
+                }
+                let error = (case.exact(&blockers) - seen).abs() / all;
+                assert!(error < 5e-3, "{top}, {turn}, {merged}: {error}");
+            }
+        }
+    }
+}
+
 /// A patch of a floor, a lamp, and something between or beside them.
 fn shaft(rng: &mut Rng) -> ([DVec3; 4], [DVec3; 4]) {
     let parallelogram = |rng: &mut Rng, middle: DVec3, size: f64| {

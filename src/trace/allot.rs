@@ -100,6 +100,6 @@ const AROUND: [(i64, i64, f64); 16] = [
     (1, 2, FAR),
 ];
 const FAR: f64 = 0.1;
-/// What a step between two neighbours counts, squared: an edge goes through the pixel, perhaps just so that all halves
-/// agree (a net has as many samples on either side of its middle).
+/// What a step between two neighbours counts, squared: an edge goes through the pixel, perhaps just so that both halves
+/// agree. As measured, like the two above.
 const EDGE: f64 = 0.06;

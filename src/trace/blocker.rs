@@ -26,22 +26,25 @@ impl Blocker {
     #[must_use]
     pub fn new(triangle: &[Vec3; 3], on: Vec3, normal: Vec3, tolerance: f32) -> Option<Self> {
         // In double precision, and corners that stay keep all their digits: a thousandth above the floor they count.
-        let height = |p: Vec3| normal.as_dvec3().dot(p.as_dvec3() - on.as_dvec3());
-        if !triangle.iter().any(|p| height(*p) > f64::from(tolerance)) {
+        let heights = triangle.map(|p| {
+            let height = normal.as_dvec3().dot(p.as_dvec3() - on.as_dvec3());
+            // What is cut off by a hair would be a corner twice, and the plane through that edge nothing.
+            if height.abs() <= f64::from(tolerance) { 0.0 } else { height }
+        });
+        if heights.iter().all(|height| *height <= 0.0) {
             return None;
         }
         let mut out = Self { corners: [Vec3::ZERO; EDGES], count: 0, turned: false };
         for i in 0..3 {
-            let (here, next) = (triangle[i], triangle[(i + 1) % 3]);
-            let (above, above_next) = (height(here), height(next));
-            if above > 0.0 {
-                out.push(here);
+            let next = (i + 1) % 3;
+            if heights[i] >= 0.0 {
+                out.push(triangle[i]);
             }
-            if (above > 0.0) != (above_next > 0.0) {
+            if heights[i] * heights[next] < 0.0 {
                 // The same point whichever way a neighbour goes along the edge.
-                let (up, down) = if above > 0.0 { (here, next) } else { (next, here) };
-                let (high, low) = (above.max(above_next), above.min(above_next));
-                out.push(up.as_dvec3().lerp(down.as_dvec3(), high / (high - low)).as_vec3());
+                let (up, down) = if heights[i] > 0.0 { (i, next) } else { (next, i) };
+                let part = heights[up] / (heights[up] - heights[down]);
+                out.push(triangle[up].as_dvec3().lerp(triangle[down].as_dvec3(), part).as_vec3());
             }
         }
         (out.count > 2).then_some(out)
@@ -53,8 +56,9 @@ impl Blocker {
         &self.corners[..self.count]
     }
 
+    /// Not twice: an edge has a length.
     fn push(&mut self, corner: Vec3) {
-        if self.count < EDGES {
+        if self.count < EDGES && !self.corners().contains(&corner) {
             self.corners[self.count] = corner;
             self.count += 1;
         }
@@ -68,8 +72,7 @@ impl Blocker {
 
     /// Turned so that it goes around counterclockwise as seen from all of `patch`; `None` if some points see its back.
     fn turned(mut self, patch: &[DVec3]) -> Option<Self> {
-        let (a, b, c) = (self.corners[0], self.corners[1], self.corners[2]);
-        let sides = patch.iter().map(|p| side(*p, a, b, c));
+        let sides = patch.iter().map(|p| self.side(*p));
         if sides.clone().all(|side| side < 0.0) {
             self.corners[..self.count].reverse();
         } else if !sides.clone().all(|side| side > 0.0) {
@@ -77,6 +80,12 @@ impl Blocker {
         }
         self.turned = true;
         Some(self)
+    }
+
+    /// Positive where it looks counterclockwise, if it is convex; by all of its corners, for some may be close together.
+    pub(super) fn side(&self, from: DVec3) -> f64 {
+        let corners = self.corners();
+        corners.windows(2).map(|pair| side(from, corners[0], pair[0], pair[1])).sum()
     }
 
     /// Whether no corner of `other` is outside of it, as seen from any point of `patch`, from which both look
@@ -108,6 +117,7 @@ impl Blocker {
         if !(3..=EDGES).contains(&rim.len()) {
             return None;
         }
+        let length = rim.len();
         let mut out = Self { corners: [Vec3::ZERO; EDGES], count: 0, turned: true };
         let (first, mut end) = rim.swap_remove(0);
         out.push(first);
@@ -115,8 +125,9 @@ impl Blocker {
             out.push(end);
             end = rim.swap_remove(next).1;
         }
-        let is_simple = (0..out.count).all(|k| !out.corners[..k].contains(&out.corners[k]));
-        let is_convex = rim.is_empty() && end == first && is_simple && out.covers(&out, patch);
+        // Each corner once.
+        let is_simple = rim.is_empty() && end == first && out.count == length;
+        let is_convex = is_simple && out.covers(&out, patch);
         (is_convex && parts.iter().all(|part| out.covers(part, patch))).then_some(out)
     }
 }

@@ -35,25 +35,14 @@ pub fn relative_noise(film: &Film) -> Option<f64> {
 /// Estimated relative error of the picture's luminance.
 ///
 /// The film's halves A and B are independent, so (A − B) / 2 has the variance of their mean: it stands for the
-/// error. Pixels that are dark in every sample count as exact.
+/// error. (Where one has a samples and the other b, (A − B) √(ab) / (a + b).) Pixels that are dark in every sample count as exact.
 ///
 /// `None` before both halves have a sample, or when all is black. It knows nothing of light that no
 /// sample has seen yet.
 #[must_use]
 pub fn estimate(film: &Film) -> Option<Noise> {
-    let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
     let size = film.size();
-    let row = |y: u32| -> Option<(Vec<f64>, Vec<f64>)> {
-        let halves = |pixel: &Pixel| {
-            let (a, b) = (brightness(pixel.half_mean(0)?), brightness(pixel.half_mean(1)?));
-            let [in_a, in_b] = pixel.counts().map(f64::from);
-            Some(((a * in_a + b * in_b) / (in_a + in_b), 0.5 * (a - b)))
-        };
-        film.row(y).map(halves).collect()
-    };
-    let rows: Vec<_> = (0..size.y).into_par_iter().map(row).collect::<Option<_>>()?;
-    let (picture, errors): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
-    let (picture, errors) = (picture.concat(), errors.concat());
+    let (picture, errors) = luminances(film)?;
     let squares = squares(&errors, &picture, size)?;
     let (sum, fourth) = squares.iter().fold((0.0, 0.0), |(sum, fourth), x| (sum + x, fourth + x * x));
     let relative = (sum / squares.len() as f64).sqrt();
@@ -66,14 +55,23 @@ pub fn estimate(film: &Film) -> Option<Noise> {
 /// the picture is not ready for it.
 #[must_use]
 pub fn map(film: &Film) -> Vec<f32> {
-    let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
-    let pixels = || (0..film.size().y).flat_map(|y| film.row(y));
-    let errors: Option<Vec<f64>> = pixels()
-        .map(|pixel| Some(0.5 * (brightness(pixel.half_mean(0)?) - brightness(pixel.half_mean(1)?))))
-        .collect();
-    let picture: Vec<f64> = pixels().map(|pixel| brightness(pixel.mean())).collect();
-    let squares = errors.and_then(|errors| squares(&errors, &picture, film.size()));
+    let squares = luminances(film).and_then(|(picture, errors)| squares(&errors, &picture, film.size()));
     squares.unwrap_or_default().into_iter().map(|x| x.sqrt() as f32).collect()
+}
+
+/// Of all pixels, and what stands for their errors; `None` before both halves of each have a sample.
+fn luminances(film: &Film) -> Option<(Vec<f64>, Vec<f64>)> {
+    let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
+    let halves = |pixel: &Pixel| {
+        let (a, b) = (brightness(pixel.half_mean(0)?), brightness(pixel.half_mean(1)?));
+        let [in_a, in_b] = pixel.counts().map(f64::from);
+        let all = in_a + in_b;
+        Some(((a * in_a + b * in_b) / all, (a - b) * (in_a * in_b).sqrt() / all))
+    };
+    let row = |y: u32| film.row(y).map(halves).collect::<Option<(Vec<_>, Vec<_>)>>();
+    let rows: Vec<_> = (0..film.size().y).into_par_iter().map(row).collect::<Option<_>>()?;
+    let (picture, errors): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+    Some((picture.concat(), errors.concat()))
 }
 
 /// What [`relative_noise`] estimates: the error of a picture against the truth, both as luminances in rows

@@ -43,9 +43,9 @@ pub(super) struct Window {
     corners: [Ray; 4],
 }
 
-/// So many triangles in the way are too many.
+/// More outlines in the way are too many.
 const FEW: usize = 16;
-/// So many are looked at, since together they may be few outlines.
+/// So many triangles are looked at, since together they may be few outlines.
 const LOOKED_AT: usize = 32;
 /// So many triangles in view are remembered.
 const MANY: usize = 32;

@@ -1,7 +1,7 @@
-//! The part of a lamp that a point sees past a few triangles, exactly: penumbrae without noise.
+//! The part of a lamp that a point sees past a few outlines, exactly: penumbrae without noise.
 //!
-//! The lamp's parallelogram is cut along the planes through the point and each triangle's edges; what is inside of all
-//! of a triangle's planes is hidden. What is left are convex pieces, each with Lambert's closed form. This is K. Weiler
+//! The lamp's parallelogram is cut along the planes through the point and each outline's edges; what is inside of all
+//! of an outline's planes is hidden: what there is of one is subtracted. What more leave are convex pieces, each with Lambert's closed form. This is K. Weiler
 //! and P. Atherton's "Hidden Surface Removal Using Polygon Area Sorting", SIGGRAPH 1977, with lamps for surfaces, as
 //! T. Nishita and E. Nakamae used it for shadows, "Continuous Tone Representation of Three-Dimensional Objects Taking
 //! Account of Shadows and Interreflection", 1985.
@@ -61,7 +61,8 @@ pub fn irradiance(
     let sum = if cutting.any(|i| blockers[i].reaches(&piece, point, &mut planes[1])) {
         seen(piece, normal, point, blockers, which & (u32::MAX << first), &mut budget).abs()
     } else {
-        whole() - hidden(piece, normal, &planes[0][..blockers[first].count])
+        // Of the same formula: where all is hidden, nothing is left.
+        piece.irradiance(normal).abs() - hidden(piece, normal, &planes[0][..blockers[first].count])
     };
     // Where blockers hide all of it by a hair, cutting leaves slivers of nothing but rounding.
     let is_dark = sum < FAINT && piece.count > 2 && sum <= ROUNDING * whole();
@@ -124,7 +125,7 @@ pub struct Reach<'a> {
     pub block: &'a Block,
     /// The lamp.
     pub quad: &'a Quad,
-    /// No more than 32.
+    /// Fewer than 32.
     pub blockers: &'a [Blocker],
     /// A bit for each of them; all are set where one hides all of it.
     pub out: &'a mut [u32; LANES],
@@ -147,8 +148,11 @@ impl Job for Reach<'_> {
             if !blocker.turned {
                 for (i, sign) in sign.iter_mut().enumerate() {
                     let point = block.position.get(i);
-                    let (a, b, c) = (corners[0] - point, corners[1] - point, corners[2] - point);
-                    *sign = if a.cross(b).dot(c) > 0.0 { 1.0 } else { -1.0 };
+                    let mut side = 0.0;
+                    for pair in corners.windows(2) {
+                        side += (corners[0] - point).cross(pair[0] - point).dot(pair[1] - point);
+                    }
+                    *sign = if side > 0.0 { 1.0 } else { -1.0 };
                 }
             }
             let (mut outside, mut inside) = ([false; LANES], [true; LANES]);
@@ -197,18 +201,15 @@ impl Blocker {
         let corners = self.corners();
         let first = corners[0].as_dvec3() - point;
         let mut here = first;
-        let mut sign = 1.0;
+        // Seen edge-on.
+        let side = if self.turned { 1.0 } else { self.side(point) };
+        if side == 0.0 {
+            return false;
+        }
+        let sign = side.signum();
         for (i, plane) in planes[..self.count].iter_mut().enumerate() {
             let next = corners.get(i + 1).map_or(first, |p| p.as_dvec3() - point);
             let mut across = here.cross(next);
-            if i == 0 && !self.turned {
-                let side = across.dot(corners[2].as_dvec3() - point);
-                // Seen edge-on.
-                if side == 0.0 {
-                    return false;
-                }
-                sign = side.signum();
-            }
             across *= sign;
             *plane = across.as_vec3();
             if piece.is_outside(*plane) {

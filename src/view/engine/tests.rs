@@ -57,7 +57,8 @@ fn an_interrupt_that_comes_late_keeps_no_picture_back() {
         None
     };
     let beauty = wait(&|_| true).unwrap();
-    let view = |shift| Command::Tap { press: Press { shift, ..Press::from(Tap::PixelView) }, at: Instant::now() };
+    let view =
+        |shift| Command::Tap { press: Press { shift, ..Press::from(Tap::PixelView) }, at: Instant::now() };
     for _ in 0..3 {
         commands.send(view(false)).unwrap();
         assert!(wait(&|rgba| *rgba != *beauty).is_some(), "the noise is not shown");
