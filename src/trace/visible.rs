@@ -201,17 +201,15 @@ impl Blocker {
         let corners = self.corners();
         let first = corners[0].as_dvec3() - point;
         let mut here = first;
-        // Seen edge-on.
         let side = if self.turned { 1.0 } else { self.side(point) };
+        // Seen edge-on.
         if side == 0.0 {
             return false;
         }
         let sign = side.signum();
         for (i, plane) in planes[..self.count].iter_mut().enumerate() {
             let next = corners.get(i + 1).map_or(first, |p| p.as_dvec3() - point);
-            let mut across = here.cross(next);
-            across *= sign;
-            *plane = across.as_vec3();
+            *plane = (here.cross(next) * sign).as_vec3();
             if piece.is_outside(*plane) {
                 return false;
             }
