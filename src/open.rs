@@ -121,6 +121,7 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
         sampling: wishes.sampling.unwrap_or(default.sampling),
         pixel_sampling: default.pixel_sampling,
         shafts: default.shafts,
+        light_samples: default.light_samples,
         reuse: default.reuse,
     };
     let samples = wishes.samples.or(file.spp);

@@ -56,9 +56,10 @@ impl Identity {
                 Some(Filter::Bilinear) => "bilinear".to_owned(),
             },
             sampling: format!(
-                "{:?}, {:?}{}{}",
+                "{:?}, {:?}, {} light samples{}{}",
                 settings.sampling,
                 settings.pixel_sampling.unwrap_or(settings.sampling),
+                settings.light_samples,
                 if settings.shafts { "" } else { ", no shafts" },
                 if settings.reuse { "" } else { ", no reuse" }
             )

@@ -28,15 +28,18 @@ pub const OURS: &str = "ours";
 pub const RANDOM: &str = "random";
 
 /// All of them, in the order of the tables.
-pub const METHODS: [Method; 9] = [
+pub const METHODS: [Method; 10] = [
     Method {
         name: RANDOM,
         title: "plain random",
-        changes: "every number independent, as the ancestor sampled its area lights",
+        changes: "every number independent, one sample of each light, as the ancestor sampled its area lights",
         ablation: false,
         adaptive: false,
         only: None,
-        apply: |settings| settings.sampling = Sampling::Independent,
+        apply: |settings| {
+            settings.sampling = Sampling::Independent;
+            settings.light_samples = 1;
+        },
     },
     Method {
         name: "stratified",
@@ -45,7 +48,10 @@ pub const METHODS: [Method; 9] = [
         ablation: false,
         adaptive: false,
         only: None,
-        apply: |settings| settings.sampling = Sampling::Stratified,
+        apply: |settings| {
+            settings.sampling = Sampling::Stratified;
+            settings.light_samples = 1;
+        },
     },
     Method {
         name: OURS,
@@ -83,6 +89,15 @@ pub const METHODS: [Method; 9] = [
         adaptive: true,
         only: Some(Integrator::Path),
         apply: |settings| settings.reuse = false,
+    },
+    Method {
+        name: "one-light-sample",
+        title: "ours − second look",
+        changes: "one sample of each light wherever the eye looks, instead of two",
+        ablation: true,
+        adaptive: true,
+        only: None,
+        apply: |settings| settings.light_samples = 1,
     },
     Method {
         name: "shifted",

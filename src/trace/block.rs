@@ -10,7 +10,7 @@ use super::surface::{Interaction, UNIT};
 use super::warp::{cosine_hemisphere, offset};
 use crate::bvh::Isa;
 use crate::bvh::simd::{Job, Simd};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// Points in a block.
@@ -148,10 +148,23 @@ impl Block {
         }
     }
 
-    /// The points on flat triangles that are where their mesh is, all lanes: what [`Interaction::new`] does.
-    pub fn find_points(&mut self, isa: Isa) {
-        isa.run(FindPoints(self));
+    /// The points on flat triangles, all lanes: what [`Interaction::new`] does. Of one instance if it is `placed` elsewhere than
+    /// its mesh is.
+    pub fn find_points(&mut self, isa: Isa, placed: Option<&Placed>) {
+        match placed {
+            None => isa.run(FindPoints(self)),
+            Some(placed) => isa.run(FindPlaced(self, placed)),
+        }
     }
+}
+
+/// Where an instance is.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// Of points.
+    pub world_from_local: DAffine3,
+    /// Of normals, up to their length.
+    pub normal_matrix: DMat3,
 }
 
 struct FindPoints<'a>(&'a mut Block);
@@ -163,29 +176,63 @@ impl Job for FindPoints<'_> {
     fn run<S: Simd>(self, _: S) {
         let block = self.0;
         for i in 0..LANES {
-            let a = block.corners[0].get(i).as_dvec3();
-            let b = block.corners[1].get(i).as_dvec3();
-            let c = block.corners[2].get(i).as_dvec3();
-            let (u, v) = (f64::from(block.weights.0[0][i]), f64::from(block.weights.0[1][i]));
-            let position: DVec3 = a * (1.0 - u - v) + b * u + c * v;
-            let cross = (b - a).cross(c - a);
-            let facet = (cross * (1.0 / cross.length())).as_vec3();
+            let (position, cross) = on_triangle(block, i);
             let error = (position.abs() * (4.0 * UNIT)).as_vec3();
-            let front = facet.dot(block.direction.get(i)) < 0.0;
-            let normal = Vec3::select(glam::BVec3::splat(front), facet, -facet);
-            let position = position.as_vec3();
-            block.position.set(i, position);
-            block.geometric_normal.set(i, normal);
-            block.normal.set(i, normal);
-            block.origin.set(i, offset(position, error, normal));
+            set_found(block, i, [position, cross], error);
         }
     }
+}
+
+struct FindPlaced<'a>(&'a mut Block, &'a Placed);
+
+impl Job for FindPlaced<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let (block, placed) = (self.0, *self.1);
+        let m = placed.world_from_local.matrix3;
+        let (x, y, z) = (m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+        for i in 0..LANES {
+            let (local, cross) = on_triangle(block, i);
+            let spread = x * local.x.abs() + y * local.y.abs() + z * local.z.abs();
+            let position = placed.world_from_local.transform_point3(local);
+            let error = ((position.abs() + spread) * (2.0 * UNIT)).as_vec3();
+            // Of a length of its own first: large scales and small triangles leave the range of numbers together.
+            let facet = placed.normal_matrix * (cross * (1.0 / cross.length()));
+            set_found(block, i, [position, facet], error);
+        }
+    }
+}
+
+/// The point in the space of its mesh, and the triangle's normal, of any length.
+#[inline(always)]
+fn on_triangle(block: &Block, i: usize) -> (DVec3, DVec3) {
+    let a = block.corners[0].get(i).as_dvec3();
+    let b = block.corners[1].get(i).as_dvec3();
+    let c = block.corners[2].get(i).as_dvec3();
+    let (u, v) = (f64::from(block.weights.0[0][i]), f64::from(block.weights.0[1][i]));
+    (a * (1.0 - u - v) + b * u + c * v, (b - a).cross(c - a))
+}
+
+#[inline(always)]
+fn set_found(block: &mut Block, i: usize, [position, normal]: [DVec3; 2], error: Vec3) {
+    let facet = (normal * (1.0 / normal.length())).as_vec3();
+    let front = facet.dot(block.direction.get(i)) < 0.0;
+    let normal = Vec3::select(glam::BVec3::splat(front), facet, -facet);
+    let position = position.as_vec3();
+    block.position.set(i, position);
+    block.geometric_normal.set(i, normal);
+    block.normal.set(i, normal);
+    block.origin.set(i, offset(position, error, normal));
 }
 
 /// One sample of a parallelogram light for each point that is not `certain` yet; those that it is `near` need another.
 pub struct SampleQuad<'a> {
     /// The points.
     pub block: &'a Block,
+    /// Random numbers.
+    pub samplers: &'a SamplerRow<LANES>,
     /// The light.
     pub quad: &'a Quad,
     /// Radiance at its corners.
@@ -205,9 +252,9 @@ impl Job for SampleQuad<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { block, quad, radiance, two_sided, dimension, shared, out } = self;
+        let Self { block, samplers, quad, radiance, two_sided, dimension, shared, out } = self;
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        block.samplers.pairs(dimension, &mut x, &mut y);
+        samplers.pairs(dimension, &mut x, &mut y);
         sample_quad([&x, &y], block, quad, radiance, [two_sided, shared], out);
     }
 }
@@ -272,16 +319,22 @@ impl Job for IntegrateQuad<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self { block, quad, radiance, two_sided, out } = self;
-        for i in 0..LANES {
-            let (point, normal) = (block.position.get(i), block.normal.get(i));
-            let above = quad.is_above(point, normal) & quad.is_above(point, block.geometric_normal.get(i));
-            let irradiance = quad.irradiance(point, normal);
-            let irradiance = if two_sided { irradiance.abs() } else { irradiance };
-            let irradiance = if irradiance > 0.0 { irradiance } else { 0.0 };
-            let brought = block.throughput.get(i) * radiance * (irradiance * (1.0 / PI));
-            out.contribution.set(i, brought);
-            out.certain[i] &= above & quad.is_large(point);
-        }
+        integrate_quad(block, quad, radiance, two_sided, out);
+    }
+}
+
+/// See [`sample_quad`] for why.
+#[inline(always)]
+fn integrate_quad(block: &Block, quad: &Quad, radiance: Vec3, two_sided: bool, out: &mut Arrivals) {
+    for i in 0..LANES {
+        let (point, normal) = (block.position.get(i), block.normal.get(i));
+        let above = quad.is_above(point, normal) & quad.is_above(point, block.geometric_normal.get(i));
+        let irradiance = quad.irradiance(point, normal);
+        let irradiance = if two_sided { irradiance.abs() } else { irradiance };
+        let irradiance = if irradiance > 0.0 { irradiance } else { 0.0 };
+        let brought = block.throughput.get(i) * radiance * (irradiance * (1.0 / PI));
+        out.contribution.set(i, brought);
+        out.certain[i] &= above & quad.is_large(point);
     }
 }
 

@@ -4,6 +4,7 @@ use super::TraceScene;
 use super::bsdf::{Bsdf, Evaluated, Lobes};
 use super::integrator::{Batch, Path};
 use super::light::LightSample;
+use super::lights::Pick;
 use super::sampler::Sampler;
 use super::surface::Interaction;
 use crate::bvh::{Hit, Ray};
@@ -21,26 +22,42 @@ pub(super) struct Shadow {
     pub(super) key: u32,
 }
 
+/// Shadow rays in the order in which they are traced.
+#[derive(Debug, Default)]
+pub(super) struct RaysToLights {
+    /// Which light, and which of those that are queued.
+    order: Vec<u64>,
+    rays: Vec<Ray>,
+    ignored: Vec<Option<(u32, u32)>>,
+    blocked: Vec<bool>,
+}
+
 impl Batch {
     /// Adds the light of those queued shadow rays that nothing blocks; returns how many were traced.
     pub(super) fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
-        self.shadows.retain(|shadow| !scene.lights.blocks(&shadow.ray, shadow.light));
-        // Rays to one light go similar ways. Stable: the sum of a path does not depend on its neighbours.
+        let Self { shadows, rays_to_lights: RaysToLights { order, rays, ignored, blocked }, .. } = self;
+        // Rays to one light go similar ways. The sum of a path does not depend on its neighbours.
+        order.clear();
+        let waiting = (0_u64..).zip(&*shadows);
+        let clear = waiting.filter(|(_, shadow)| !scene.lights.blocks(&shadow.ray, shadow.light));
+        order.extend(clear.map(|(i, shadow)| u64::from(shadow.light) << 32 | i));
         if scene.lights.len() > 1 {
-            self.shadows.sort_by_key(|shadow| shadow.light);
+            order.sort_unstable();
         }
-        self.rays.clear();
-        self.rays.extend(self.shadows.iter().map(|shadow| shadow.ray));
-        self.ignored.clear();
-        self.ignored.extend(self.shadows.iter().map(|shadow| shadow.triangle));
-        self.blocked.resize(self.rays.len(), false);
-        let shadows = &self.shadows;
-        let random = |i: usize, key: u32| shadows[i].sampler.hashed(key, shadows[i].key);
-        scene.any_hits(&self.rays, &mut self.blocked, &self.ignored, random);
-        for (shadow, _) in self.shadows.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
-            self.radiance[shadow.entry as usize] += shadow.contribution;
+        let of = |at: u64| &shadows[at as u32 as usize];
+        rays.clear();
+        rays.extend(order.iter().map(|&at| of(at).ray));
+        ignored.clear();
+        ignored.extend(order.iter().map(|&at| of(at).triangle));
+        blocked.clear();
+        blocked.resize(rays.len(), false);
+        let random = |i: usize, key: u32| of(order[i]).sampler.hashed(key, of(order[i]).key);
+        scene.any_hits(rays, blocked, ignored, random);
+        for (&at, _) in order.iter().zip(&*blocked).filter(|(_, blocked)| !**blocked) {
+            self.radiance[of(at).entry as usize] += of(at).contribution;
         }
-        self.shadows.len() as u64
+        shadows.clear();
+        order.len() as u64
     }
 
     /// Queues the ray to a light sample.
@@ -55,8 +72,8 @@ impl Batch {
         at: &Interaction,
         bsdf: &Bsdf,
         followed: Lobes,
-        light: u32,
-        chance: f32,
+        &Pick { light, chance }: &Pick,
+        [member, members]: [u32; 2],
         sample: &LightSample,
     ) {
         let Evaluated { diffuse, glossy, pdf: bounce_pdf } = bsdf.evaluate(sample.wi, followed);
@@ -69,7 +86,7 @@ impl Batch {
                 (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
             }
         };
-        let mut contribution = path.throughput * weight * sample.radiance;
+        let mut contribution = path.throughput * weight * sample.radiance / members as f32;
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, sample);
         }
@@ -96,9 +113,14 @@ impl Batch {
             light,
             triangle: sample.triangle,
             contribution,
-            key: light.wrapping_add(path.depth << 16).wrapping_add(1 << 31),
+            key: shadow_key(light, path.depth, member),
         });
     }
+}
+
+/// Of the random numbers that a shadow ray needs on its way.
+pub(super) fn shadow_key(light: u32, depth: u32, member: u32) -> u32 {
+    light.wrapping_add(depth << 16).wrapping_add(member << 24).wrapping_add(1 << 31)
 }
 
 /// What is left after that way (J. H. Lambert, "Photometria", 1760; A. Beer, 1852).

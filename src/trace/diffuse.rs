@@ -2,31 +2,32 @@
 //!
 //! Where it is known what is in the way of a light, it is computed instead of sampled: no shadow rays, and no noise.
 
-use super::block::{Arrivals, Block, Depart, Departures, LANES};
+use super::block::{Arrivals, Block, Depart, Departures, LANES, Placed};
 use super::bsdf::normal::facing;
-use super::connect::{Shadow, mesh_emission, power_heuristic};
+use super::connect::{Shadow, mesh_emission, power_heuristic, shadow_key};
 use super::film::Tile;
 use super::integrator::{
     Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, PICK, Path, ROULETTE_DEPTH,
 };
 use super::light::FlatLight;
 use super::light_tree::Receiver;
-use super::quad_arrivals::arrive_from_quad;
+use super::lights::Pick;
+use super::quad_arrivals::{compute_quad, sample_quad};
 use super::reuse::{End, Start};
 use super::shape_light::Shape;
 use super::sightlines::{Sightlines, Window};
 use super::surface::Interaction;
 use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// Where paths of a wave have met diffuse surfaces, and what is needed to go on from there.
 #[derive(Debug, Default)]
 pub(super) struct Diffuse {
-    /// Paths by what their points need: where something is known of lights, elsewhere, and those on surfaces that are
-    /// textured, smooth or placed.
-    kinds: [Vec<Arrived>; 3],
+    /// Paths by what their points need: on flat surfaces where something is known of lights, elsewhere, on those that are
+    /// placed elsewhere than their mesh is, and on surfaces that are textured or smooth.
+    kinds: [Vec<Arrived>; KINDS],
     /// If anybody wants to know what is in the way.
     window: Option<Window>,
     /// Whether camera rays may run into lights.
@@ -47,8 +48,15 @@ pub(super) struct Diffuse {
 struct Arrived {
     path: u32,
     known: Option<u32>,
+    instance: u32,
 }
 
+const PLACED: usize = 2;
+const OTHER: usize = 3;
+const KINDS: usize = 4;
+
+/// So many shadow rays are traced before the rest of a batch is shaded.
+const SHADOWS: usize = 8192;
 /// So many answers are at hand.
 const ASKED: usize = 64;
 
@@ -77,10 +85,15 @@ impl Diffuse {
         let data = &scene.geometry.instances[hit.instance as usize];
         let flat = data.mesh.normals.is_empty()
             && data.mesh.colors.is_empty()
-            && scene.geometry.tlas.placements()[hit.instance as usize].is_identity()
             && scene.surface_at(hit).1.base_color_texture.is_none();
-        let kind = if !flat { 2 } else { usize::from(known.is_none()) };
-        self.kinds[kind].push(Arrived { path: path as u32, known });
+        let kind = if !flat {
+            OTHER
+        } else if !scene.geometry.tlas.placements()[hit.instance as usize].is_identity() {
+            PLACED
+        } else {
+            usize::from(known.is_none())
+        };
+        self.kinds[kind].push(Arrived { path: path as u32, known, instance: hit.instance });
     }
 
     fn ask(&mut self, scene: &TraceScene, hit: &Hit) -> Option<u32> {
@@ -105,15 +118,19 @@ fn end_at(at: &Interaction) -> End {
 }
 
 impl Batch {
-    /// What comes from all points that [`Diffuse::add`] has noted.
-    pub(super) fn shade_diffuse(&mut self, scene: &TraceScene) {
-        for kind in 0..3 {
-            let points = std::mem::take(&mut self.diffuse.kinds[kind]);
-            for chunk in points.chunks(LANES) {
+    /// What comes from all points that [`Diffuse::add`] has noted. Returns how many shadow rays have been traced for that.
+    pub(super) fn shade_diffuse(&mut self, scene: &TraceScene) -> u64 {
+        let mut rays = 0;
+        for kind in 0..KINDS {
+            let mut points = std::mem::take(&mut self.diffuse.kinds[kind]);
+            // What is in the way is asked once for all who know the same.
+            points.sort_by_key(|arrived| (if kind == PLACED { arrived.instance } else { 0 }, arrived.known));
+            let of_one = |a: &Arrived, b: &Arrived| kind != PLACED || a.instance == b.instance;
+            for chunk in points.chunk_by(of_one).flat_map(|run| run.chunks(LANES)) {
                 let like = self.path(chunk[0].path as usize).sampler;
                 let mut block = self.diffuse.block.take().unwrap_or_else(|| Box::new(Block::new(like)));
-                self.fill(scene, &mut block, chunk, kind < 2);
-                if kind < 2 {
+                self.fill(scene, &mut block, chunk, kind);
+                if kind < OTHER {
                     self.note_ends(&block);
                 }
                 self.diffuse.counted.clear();
@@ -123,13 +140,17 @@ impl Batch {
                     self.follow_block(scene, &block);
                 }
                 self.diffuse.block = Some(block);
+                if self.shadows.len() > SHADOWS {
+                    rays += self.connect_lights(scene);
+                }
             }
             self.diffuse.kinds[kind] = points;
             self.diffuse.kinds[kind].clear();
         }
+        rays
     }
 
-    fn fill(&mut self, scene: &TraceScene, block: &mut Block, points: &[Arrived], flat: bool) {
+    fn fill(&mut self, scene: &TraceScene, block: &mut Block, points: &[Arrived], kind: usize) {
         block.count = points.len();
         for (i, arrived) in points.iter().enumerate() {
             let path = self.path(arrived.path as usize);
@@ -139,7 +160,7 @@ impl Batch {
             block.samplers.set(i, &path.sampler);
             let (instance, surface) = scene.surface_at(hit);
             let mut albedo = surface.material.base_color;
-            if flat {
+            if kind < OTHER {
                 let corners = instance.mesh.corners(hit.triangle as usize);
                 for (rows, corner) in block.corners.iter_mut().zip(corners) {
                     rows.set(i, corner);
@@ -156,8 +177,13 @@ impl Batch {
             }
             block.throughput.set(i, path.throughput * albedo);
         }
-        if flat {
-            block.find_points(scene.geometry.tlas.isa());
+        if kind < OTHER {
+            let instance = points[0].instance as usize;
+            let placed = (kind == PLACED).then(|| Placed {
+                world_from_local: *scene.geometry.tlas.placements()[instance].world_from_local(),
+                normal_matrix: scene.geometry.instances[instance].normal_matrix,
+            });
+            block.find_points(scene.geometry.tlas.isa(), placed.as_ref());
         }
     }
 
@@ -176,12 +202,19 @@ impl Batch {
     fn light_block(&mut self, scene: &TraceScene, block: &Block) {
         let depth = self.path(block.paths[0] as usize).depth;
         let base = 1 + depth * PAIRS_PER_BOUNCE;
+        let members = |light| {
+            let members = scene.light_samples(depth, light);
+            (0..members).map(move |member| [member, members])
+        };
         if !scene.lights.samples_all(depth) {
             for i in 0..block.count {
-                let random = self.path(block.paths[i] as usize).sampler.pair(base + PICK).x;
                 let to = Receiver { point: block.position.get(i), normal: block.normal.get(i) };
-                let pick = scene.lights.pick(depth, 0, &to, random);
-                self.light_point(scene, block, i, pick.light, pick.chance, base + LIGHT);
+                for member in members(None) {
+                    let sampler = block.samplers.get(i).member(member);
+                    let random = sampler.pair(base + LIGHT);
+                    let pick = scene.lights.pick(depth, 0, &to, sampler.pair(base + PICK).x);
+                    self.light_point(scene, block, i, &pick, member, random);
+                }
             }
             return;
         }
@@ -191,12 +224,24 @@ impl Batch {
             match scene.lights.get(light) {
                 FlatLight::Shape(shape) if matches!(shape.shape, Shape::Parallelogram(_)) => {
                     let sightlines = &self.diffuse.sightlines;
-                    arrive_from_quad(scene, block, sightlines, shape, light, dimension, &mut arrivals);
-                    self.take_arrivals(block, light, depth, &arrivals);
+                    let missing = compute_quad(scene, block, sightlines, shape, light, &mut arrivals);
+                    self.take_certain(block, light, &arrivals);
+                    if missing == 0 {
+                        continue;
+                    }
+                    for member in members(Some(light)) {
+                        let samplers = block.samplers.members(member);
+                        sample_quad(scene, block, &samplers, shape, dimension, &mut arrivals);
+                        self.take_sampled(block, light, depth, member, &arrivals);
+                    }
                 }
                 _ => {
+                    let pick = Pick { light, chance: 1.0 };
                     for i in 0..block.count {
-                        self.light_point(scene, block, i, light, 1.0, dimension);
+                        for member in members(Some(light)) {
+                            let random = block.samplers.get(i).member(member).pair(dimension);
+                            self.light_point(scene, block, i, &pick, member, random);
+                        }
                     }
                 }
             }
@@ -204,43 +249,54 @@ impl Batch {
         self.diffuse.arrivals = arrivals;
     }
 
-    fn take_arrivals(&mut self, block: &Block, light: u32, depth: u32, arrivals: &Arrivals) {
+    fn take_certain(&mut self, block: &Block, light: u32, arrivals: &Arrivals) {
         for i in 0..block.count {
-            let contribution = arrivals.contribution.get(i);
-            self.diffuse.counted[i] |= u32::from(arrivals.certain[i]) << light;
-            if contribution == Vec3::ZERO {
-                continue;
-            }
-            let path = self.path(block.paths[i] as usize);
             if arrivals.certain[i] {
-                self.radiance[path.entry as usize] += contribution;
+                self.diffuse.counted[i] |= 1 << light;
+                let entry = self.entry(block.paths[i] as usize);
+                self.radiance[entry as usize] += arrivals.contribution.get(i);
+            }
+        }
+    }
+
+    fn take_sampled(
+        &mut self,
+        block: &Block,
+        light: u32,
+        depth: u32,
+        [member, members]: [u32; 2],
+        arrivals: &Arrivals,
+    ) {
+        let part = 1.0 / members as f32;
+        for i in 0..block.count {
+            let contribution = arrivals.contribution.get(i) * part;
+            if arrivals.certain[i] || contribution == Vec3::ZERO {
                 continue;
             }
             let origin = block.origin.get(i);
             let ray = Ray { origin, direction: arrivals.target.get(i) - origin, t_max: 1.0 };
             // A light nearer than rounding has no ray to it, and nothing fits between.
             if ray.direction != Vec3::ZERO {
-                let key = light.wrapping_add(depth << 16).wrapping_add(1 << 31);
-                let (entry, sampler) = (path.entry, path.sampler);
+                let key = shadow_key(light, depth, member);
+                let (entry, sampler) = (self.entry(block.paths[i] as usize), block.samplers.get(i));
                 self.shadows.push(Shadow { entry, sampler, ray, light, triangle: None, contribution, key });
             }
         }
     }
 
-    /// Samples any light for one point.
+    /// Samples any light for one point: sample number `member` of `members`.
     fn light_point(
         &mut self,
         scene: &TraceScene,
         block: &Block,
         i: usize,
-        light: u32,
-        chance: f32,
-        dimension: u32,
+        &Pick { light, chance }: &Pick,
+        [member, members]: [u32; 2],
+        random: Vec2,
     ) {
         let path = self.path(block.paths[i] as usize);
         let (position, normal, geometric) =
             (block.position.get(i), block.normal.get(i), block.geometric_normal.get(i));
-        let random = path.sampler.pair(dimension);
         let Some(sample) = scene.lights.get(light).sample(position, normal, random) else { return };
         let cosine = normal.dot(sample.wi);
         if cosine <= 0.0 || geometric.dot(sample.wi) <= 0.0 {
@@ -257,7 +313,7 @@ impl Batch {
                 cosine * shared / (PI * light_pdf)
             }
         };
-        let mut contribution = block.throughput.get(i) * sample.radiance * weight;
+        let mut contribution = block.throughput.get(i) * sample.radiance * (weight / members as f32);
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, &sample);
         }
@@ -270,7 +326,7 @@ impl Batch {
             None => Ray::new(origin, sample.wi),
         };
         if ray.direction != Vec3::ZERO {
-            let key = light.wrapping_add(path.depth << 16).wrapping_add(1 << 31);
+            let key = shadow_key(light, path.depth, member);
             let (entry, sampler, triangle) = (path.entry, path.sampler, sample.triangle);
             self.shadows.push(Shadow { entry, sampler, ray, light, triangle, contribution, key });
         }

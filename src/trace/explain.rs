@@ -4,7 +4,7 @@ use super::TraceScene;
 use super::bsdf::Bsdf;
 use super::camera::LENS;
 use super::connect::Shadow;
-use super::integrator::{Batch, LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
+use super::integrator::{Batch, Path};
 use super::light::FlatLight;
 use super::light_tree::Receiver;
 use super::sampler::Sampler;
@@ -178,30 +178,25 @@ impl Explanation {
         }
         let at = Interaction::new(scene, instance, &hit, &path.ray);
         batch.scatter(scene, path, surface, &at);
-        self.sampled(scene, path, &at, &at.bsdf(scene, surface));
+        self.sampled(scene, batch, path, &at, &at.bsdf(scene, surface));
     }
 
     /// Notes the lights that were sampled: the same numbers choose the same points.
-    fn sampled(&mut self, scene: &TraceScene, path: &Path, at: &Interaction, bsdf: &Bsdf) {
+    fn sampled(&mut self, scene: &TraceScene, batch: &mut Batch, path: &Path, at: &Interaction, bsdf: &Bsdf) {
         if !bsdf.has_smooth_lobes() || scene.lights.is_empty() {
             return;
         }
-        let base = 1 + path.depth * PAIRS_PER_BOUNCE;
-        for index in 0..scene.lights.picks(path.depth) {
-            let by_chance = !scene.lights.samples_all(path.depth);
-            let random = if by_chance { path.sampler.pair(base + PICK).x } else { 0.0 };
-            let to = Receiver { point: at.position, normal: bsdf.normal() };
-            let light = scene.lights.pick(path.depth, index, &to, random).light;
-            let u = path.sampler.pair(base + LIGHT + 2 * index as u32);
-            let sample = scene.lights.get(light).sample(at.position, bsdf.normal(), u);
-            let row = self.row(scene, path.depth, light);
+        let to = Receiver { point: at.position, normal: bsdf.normal() };
+        batch.each_pick(scene, path, &to, |_, pick, _, u| {
+            let sample = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u);
+            let row = self.row(scene, path.depth, pick.light);
             row.samples += 1;
             row.dark += 1;
             if let Some(pdf) = sample.and_then(|sample| sample.pdf) {
                 let [least, most] = row.pdf.unwrap_or([pdf; 2]);
                 row.pdf = Some([least.min(pdf), most.max(pdf)]);
             }
-        }
+        });
     }
 
     /// Notes a ray to a light, and whether it comes through.
@@ -212,20 +207,21 @@ impl Explanation {
         let blocked = blocked[0] || scene.lights.blocks(&shadow.ray, shadow.light);
         let (_, visits) = scene.geometry.tlas.inspect(&shadow.ray, Order::NearFirst, true, |_| {});
         let light = scene.lights.get(shadow.light);
-        let has_extent = !matches!(light, FlatLight::Point { .. } | FlatLight::Spot { .. })
-            && !matches!(light, FlatLight::Directional { sin2_radius, .. } if *sin2_radius == 0.0);
-        let kind = match (blocked, has_extent) {
+        let kind = match (blocked, light.has_extent()) {
             (false, _) => Kind::Lit,
             (true, false) => Kind::Shadow,
             (true, true) => Kind::Blocked,
         };
         let t = if shadow.ray.t_max.is_finite() { shadow.ray.t_max } else { far };
         self.segments.push(Segment { from: shadow.ray.origin, to: shadow.ray.at(t), kind });
+        let picked = scene.lights.samples_all(depth).then_some(shadow.light);
+        let together = scene.light_samples(depth, picked);
         let row = self.row(scene, depth, shadow.light);
         row.dark = row.dark.saturating_sub(1);
         row.visits[0] += visits.nodes as f32;
         row.visits[1] += visits.triangles as f32;
-        row.unblocked += luminance(shadow.contribution);
+        // Of several samples that are taken together each brings its part.
+        row.unblocked += luminance(shadow.contribution) * together as f32;
         if !blocked {
             self.radiance[shadow.entry as usize] += shadow.contribution;
             let row = self.row(scene, depth, shadow.light);

@@ -7,11 +7,12 @@
 use super::block::LANES;
 use super::bsdf::Lobes;
 use super::camera::Look;
-use super::connect::{Shadow, passed, power_heuristic};
+use super::connect::{RaysToLights, Shadow, passed, power_heuristic};
 use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::FlatLight;
 use super::light_tree::Receiver;
+use super::lights::Pick;
 use super::pass::RayCounts;
 use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
@@ -85,9 +86,8 @@ pub struct Batch {
     pub(super) diffuse: Diffuse,
     pub(super) reuse: Reuse,
     pub(super) rays: Vec<Ray>,
+    pub(super) rays_to_lights: RaysToLights,
     pub(super) hits: Vec<Option<Hit>>,
-    pub(super) ignored: Vec<Option<(u32, u32)>>,
-    pub(super) blocked: Vec<bool>,
     pub(super) radiance: Vec<Vec3>,
     /// Which of `pixels`, and which sample: all of one pixel, then of another.
     pub(super) keys: Vec<(u32, u32)>,
@@ -213,6 +213,12 @@ impl Batch {
         }
     }
 
+    /// Its entry alone.
+    #[inline]
+    pub(super) fn entry(&self, index: usize) -> u32 {
+        self.paths.get(index).map_or(index as u32, |path| path.entry)
+    }
+
     /// Follows `rays`, which are those of `paths`; in the first wave there are none yet.
     fn wave(&mut self, scene: &TraceScene, rays: &mut RayCounts) {
         self.next.clear();
@@ -228,7 +234,7 @@ impl Batch {
         for i in 0..self.rays.len() {
             self.arrive(scene, i);
         }
-        self.shade_diffuse(scene);
+        rays.shadow += self.shade_diffuse(scene);
         rays.shadow += self.connect_lights(scene);
         rays.bounce += self.next.len() as u64;
         std::mem::swap(&mut self.paths, &mut self.next);
@@ -312,6 +318,29 @@ impl Batch {
         self.radiance[path.entry as usize] += path.throughput * radiance * weight;
     }
 
+    /// Calls `visit` for each light sample to be taken where `path` is: with the light, which sample of how many, and random
+    /// numbers.
+    pub(super) fn each_pick(
+        &mut self,
+        scene: &TraceScene,
+        path: &Path,
+        to: &Receiver,
+        mut visit: impl FnMut(&mut Self, &Pick, [u32; 2], Vec2),
+    ) {
+        let base = 1 + path.depth * PAIRS_PER_BOUNCE;
+        let by_chance = !scene.lights.samples_all(path.depth);
+        for index in 0..scene.lights.picks(path.depth) {
+            let light = (!by_chance).then_some(index as u32);
+            let members = scene.light_samples(path.depth, light);
+            for member in (0..members).map(|member| [member, members]) {
+                let sampler = path.sampler.member(member);
+                let random = if by_chance { sampler.pair(base + PICK).x } else { 0.0 };
+                let pick = scene.lights.pick(path.depth, index, to, random);
+                visit(self, &pick, member, sampler.pair(base + LIGHT + index as u32 * 2));
+            }
+        }
+    }
+
     /// Queues shadow rays to lights, and the ray that goes on.
     pub(super) fn scatter(&mut self, scene: &TraceScene, path: &Path, surface: &Surface, at: &Interaction) {
         let bsdf = at.bsdf(scene, surface);
@@ -323,16 +352,11 @@ impl Batch {
             Integrator::Path => Lobes::ALL,
         };
         if bsdf.has_smooth_lobes() && !scene.lights.is_empty() {
-            for index in 0..scene.lights.picks(path.depth) {
-                let pair = index as u32 * 2;
-                let by_chance = !scene.lights.samples_all(path.depth);
-                let random = if by_chance { path.sampler.pair(base + PICK).x } else { 0.0 };
-                let pick = scene.lights.pick(path.depth, index, &to, random);
-                let u = path.sampler.pair(base + LIGHT + pair);
+            self.each_pick(scene, path, &to, |batch, pick, member, u| {
                 if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {
-                    self.connect(scene, path, at, &bsdf, followed, pick.light, pick.chance, &sample);
+                    batch.connect(scene, path, at, &bsdf, followed, pick, member, &sample);
                 }
-            }
+            });
         }
         if !bsdf.has(followed) {
             return;

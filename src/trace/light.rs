@@ -94,6 +94,19 @@ impl LightSample {
 }
 
 impl FlatLight {
+    /// Whether it is so many that a tree chooses among them.
+    #[must_use]
+    pub fn is_many(&self) -> bool {
+        matches!(self, Self::Mesh(mesh) if mesh.is_many())
+    }
+
+    /// Whether it has more than one point to be sampled.
+    #[must_use]
+    pub fn has_extent(&self) -> bool {
+        !matches!(self, Self::Point { .. } | Self::Spot { .. })
+            && !matches!(self, Self::Directional { sin2_radius, .. } if *sin2_radius == 0.0)
+    }
+
     /// A direction toward the light from `point` with unit normal `normal`. `None` where it is dark.
     #[must_use]
     pub fn sample(&self, point: Vec3, normal: Vec3, u: Vec2) -> Option<LightSample> {

@@ -30,11 +30,17 @@ pub struct MeshLight {
 }
 
 /// Up to this many are chosen by their area alone: there is little to be won.
-const FEW: usize = 16;
+pub(super) const FEW: usize = 16;
 /// So often one of many is chosen by its area: what it is expected to bring does not know what is in between.
 const BY_AREA: f32 = 0.25;
 
 impl MeshLight {
+    /// Whether a tree chooses among its triangles.
+    #[must_use]
+    pub fn is_many(&self) -> bool {
+        !self.tree.is_empty()
+    }
+
     /// Of the triangles of an instance (numbers in its mesh, rising, and corners in render space) that shine with
     /// this luminance; those without area are left out. `None` if nothing is left. `before` is a light that it may
     /// be again.

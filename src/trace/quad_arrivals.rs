@@ -3,24 +3,25 @@
 use super::block::{Arrivals, Block, IntegrateQuad, LANES, SampleQuad};
 use super::connect::power_heuristic;
 use super::quad::Quad;
+use super::sampler::SamplerRow;
 use super::shape_light::{Shape, ShapeLight};
 use super::sightlines::Sightlines;
 use super::visible::{HIDDEN, Reach, irradiance};
 use super::{Integrator, TraceScene, spherical};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// What a parallelogram light brings: all of it where it is known what is in the way, elsewhere by a sample each.
-pub(super) fn arrive_from_quad(
+/// All that a parallelogram light brings where it is known what is in the way; elsewhere `out` is not certain. How many are
+/// not.
+pub(super) fn compute_quad(
     scene: &TraceScene,
     block: &Block,
     sightlines: &Sightlines,
     shape: &ShapeLight,
     light: u32,
-    dimension: u32,
     out: &mut Arrivals,
-) {
-    let Shape::Parallelogram(quad) = &shape.shape else { return };
+) -> usize {
+    let Shape::Parallelogram(quad) = &shape.shape else { return 0 };
     let isa = scene.geometry.tlas.isa();
     let mut missing = block.count;
     out.certain = [false; LANES];
@@ -44,30 +45,43 @@ pub(super) fn arrive_from_quad(
             missing -= usize::from(out.certain[i]);
         }
     }
-    if missing > 0 {
-        let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
-        let shared = scene.settings.integrator == Integrator::Path;
-        isa.run(SampleQuad { block, quad, radiance, two_sided, dimension, shared, out });
-        for i in 0..block.count {
-            if out.near[i] {
-                sample_near(block, i, shape, dimension, shared, out);
-            }
+    missing
+}
+
+/// A sample of a parallelogram light for each point for which `out` is not certain.
+pub(super) fn sample_quad(
+    scene: &TraceScene,
+    block: &Block,
+    samplers: &SamplerRow<LANES>,
+    shape: &ShapeLight,
+    dimension: u32,
+    out: &mut Arrivals,
+) {
+    let Shape::Parallelogram(quad) = &shape.shape else { return };
+    let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
+    let shared = scene.settings.integrator == Integrator::Path;
+    scene.geometry.tlas.isa().run(SampleQuad {
+        block,
+        samplers,
+        quad,
+        radiance,
+        two_sided,
+        dimension,
+        shared,
+        out,
+    });
+    for i in 0..block.count {
+        if out.near[i] {
+            let random = samplers.get(i).pair(dimension);
+            sample_near(block, i, shape, random, shared, out);
         }
     }
 }
 
 /// A sample of a light that is near one point.
-fn sample_near(
-    block: &Block,
-    i: usize,
-    shape: &ShapeLight,
-    dimension: u32,
-    shared: bool,
-    out: &mut Arrivals,
-) {
+fn sample_near(block: &Block, i: usize, shape: &ShapeLight, random: Vec2, shared: bool, out: &mut Arrivals) {
     out.contribution.set(i, Vec3::ZERO);
     let normal = block.normal.get(i);
-    let random = block.samplers.get(i).pair(dimension);
     let Some(sample) = shape.sample(block.position.get(i), normal, random) else { return };
     let (Some(pdf), Some(target)) = (sample.pdf, sample.target) else { return };
     let cosine = normal.dot(sample.wi);

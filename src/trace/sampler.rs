@@ -62,8 +62,13 @@ impl Sampler {
     /// one pixel. They repeat after 2³² numbers.
     #[must_use]
     pub fn shared(self, member: u32, members: u32) -> Self {
-        let index = self.index.wrapping_mul(members).wrapping_add(member);
-        Self { seed: hash(self.seed ^ 0x2545_f491), index, ..self }
+        Self { seed: hash(self.seed ^ 0x2545_f491), ..self.member([member, members]) }
+    }
+
+    /// Number `member` of `members` samples of lights that this sample takes: over all samples they are one sequence.
+    #[must_use]
+    pub fn member(self, [member, members]: [u32; 2]) -> Self {
+        Self { index: self.index.wrapping_mul(members).wrapping_add(member), ..self }
     }
 
     /// The same, its numbers spread as `settings` say.
@@ -140,6 +145,12 @@ impl<const N: usize> SamplerRow<N> {
     #[must_use]
     pub fn get(&self, i: usize) -> Sampler {
         Sampler { seed: self.seeds[i], index: self.indices[i], ..self.like }
+    }
+
+    /// [`Sampler::member`] of each.
+    #[must_use]
+    pub fn members(&self, [member, members]: [u32; 2]) -> Self {
+        Self { indices: self.indices.map(|index| index.wrapping_mul(members).wrapping_add(member)), ..*self }
     }
 
     /// [`Sampler::pair`] of each.

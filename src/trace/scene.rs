@@ -148,6 +148,21 @@ impl<'a> TraceScene<'a> {
         (instance, materials.get(material as usize).unwrap_or(&materials[0]))
     }
 
+    /// How many samples are taken of a light at a vertex after `depth` bounces; `None`: of one that is chosen by chance.
+    #[must_use]
+    pub fn light_samples(&self, depth: u32, light: Option<u32>) -> u32 {
+        let count = self.settings.light_samples.max(1);
+        match light.map(|light| self.lights.get(light)) {
+            _ if depth > 0 => 1,
+            // All samples of a light without extent are the same.
+            Some(light) if !light.has_extent() => 1,
+            // Which of many, and where on it.
+            Some(light) if light.is_many() => count.saturating_mul(count),
+            None if self.lights.len() > super::mesh_light::FEW => count.saturating_mul(count),
+            _ => count,
+        }
+    }
+
     /// `texture` at the first or second of `uvs`, white where there is none.
     #[must_use]
     pub fn texture(&self, texture: Option<TextureIndex>, uvs: [Vec2; 2]) -> Vec4 {

@@ -24,9 +24,15 @@ pub struct RenderSettings {
     pub pixel_sampling: Option<Sampling>,
     /// Whether light is computed instead of sampled where nothing can be in its way.
     pub shafts: bool,
+    /// Samples of each light that one sample of a pixel takes where the eye looks, at least 1: finding the place costs more
+    /// than another look at a light from there.
+    pub light_samples: u32,
     /// Whether neighbours share what their paths find.
     pub reuse: bool,
 }
+
+/// As measured: 1 leaves 1.5 times the squared error in direct light after equal time, 4 needs some seconds to be better.
+pub const LIGHT_SAMPLES: u32 = 2;
 
 impl RenderSettings {
     /// Whether neighbours share their paths.
@@ -83,6 +89,7 @@ impl Default for RenderSettings {
             sampling: Sampling::Sobol,
             pixel_sampling: None,
             shafts: true,
+            light_samples: LIGHT_SAMPLES,
             reuse: true,
         }
     }
