@@ -44,7 +44,7 @@ pub const METHODS: [Method; 10] = [
     Method {
         name: "stratified",
         title: "stratified 4×4",
-        changes: "a jittered grid of 4 × 4 cells, over and over",
+        changes: "a jittered grid of 4 × 4 cells, over and over, one sample of each light",
         ablation: false,
         adaptive: false,
         only: None,
@@ -93,7 +93,7 @@ pub const METHODS: [Method; 10] = [
     Method {
         name: "one-light-sample",
         title: "ours − second look",
-        changes: "one sample of each light wherever the eye looks, instead of two",
+        changes: "one sample of each light wherever the eye looks",
         ablation: true,
         adaptive: true,
         only: None,

@@ -12,6 +12,7 @@ use crate::bvh::Isa;
 use crate::bvh::simd::{Job, Simd};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
+use std::ops::Range;
 
 /// Points in a block.
 pub const LANES: usize = 64;
@@ -148,12 +149,12 @@ impl Block {
         }
     }
 
-    /// The points on flat triangles, all lanes: what [`Interaction::new`] does. Of one instance if it is `placed` elsewhere than
-    /// its mesh is.
-    pub fn find_points(&mut self, isa: Isa, placed: Option<&Placed>) {
+    /// The points on flat triangles in these lanes: what [`Interaction::new`] does. `placed`: where the one instance is that they
+    /// are on; `None` if its mesh is there already.
+    pub fn find_points(&mut self, isa: Isa, lanes: Range<usize>, placed: Option<&Placed>) {
         match placed {
-            None => isa.run(FindPoints(self)),
-            Some(placed) => isa.run(FindPlaced(self, placed)),
+            None => isa.run(FindPoints(self, lanes)),
+            Some(placed) => isa.run(FindPlaced(self, lanes, placed)),
         }
     }
 }
@@ -167,42 +168,48 @@ pub struct Placed {
     pub normal_matrix: DMat3,
 }
 
-struct FindPoints<'a>(&'a mut Block);
+struct FindPoints<'a>(&'a mut Block, Range<usize>);
 
 impl Job for FindPoints<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let block = self.0;
-        for i in 0..LANES {
+        let Self(block, lanes) = self;
+        for i in lanes {
             let (position, cross) = on_triangle(block, i);
             let error = (position.abs() * (4.0 * UNIT)).as_vec3();
-            set_found(block, i, [position, cross], error);
+            set_found(block, i, position, unit(cross), error);
         }
     }
 }
 
-struct FindPlaced<'a>(&'a mut Block, &'a Placed);
+struct FindPlaced<'a>(&'a mut Block, Range<usize>, &'a Placed);
 
 impl Job for FindPlaced<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let (block, placed) = (self.0, *self.1);
+        let Self(block, lanes, placed) = self;
         let m = placed.world_from_local.matrix3;
         let (x, y, z) = (m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
-        for i in 0..LANES {
+        for i in lanes {
             let (local, cross) = on_triangle(block, i);
             let spread = x * local.x.abs() + y * local.y.abs() + z * local.z.abs();
             let position = placed.world_from_local.transform_point3(local);
             let error = ((position.abs() + spread) * (2.0 * UNIT)).as_vec3();
-            // Of a length of its own first: large scales and small triangles leave the range of numbers together.
-            let facet = placed.normal_matrix * (cross * (1.0 / cross.length()));
-            set_found(block, i, [position, facet], error);
+            set_found(block, i, position, unit(placed.normal_matrix * unit(cross)), error);
         }
     }
+}
+
+/// Of length 1; +z if it has none.
+#[inline(always)]
+fn unit(v: DVec3) -> DVec3 {
+    let scale = 1.0 / v.length();
+    let is_right = (scale > 0.0) & (scale < f64::INFINITY);
+    DVec3::select(glam::BVec3::splat(is_right), v * scale, DVec3::Z)
 }
 
 /// The point in the space of its mesh, and the triangle's normal, of any length.
@@ -216,8 +223,8 @@ fn on_triangle(block: &Block, i: usize) -> (DVec3, DVec3) {
 }
 
 #[inline(always)]
-fn set_found(block: &mut Block, i: usize, [position, normal]: [DVec3; 2], error: Vec3) {
-    let facet = (normal * (1.0 / normal.length())).as_vec3();
+fn set_found(block: &mut Block, i: usize, position: DVec3, facet: DVec3, error: Vec3) {
+    let facet = facet.as_vec3();
     let front = facet.dot(block.direction.get(i)) < 0.0;
     let normal = Vec3::select(glam::BVec3::splat(front), facet, -facet);
     let position = position.as_vec3();
@@ -241,6 +248,8 @@ pub struct SampleQuad<'a> {
     pub two_sided: bool,
     /// Which pair of random numbers.
     pub dimension: u32,
+    /// How many such samples are taken of each point.
+    pub members: f32,
     /// Whether bounces may find the light too, and share it.
     pub shared: bool,
     /// What comes out.
@@ -252,10 +261,10 @@ impl Job for SampleQuad<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { block, samplers, quad, radiance, two_sided, dimension, shared, out } = self;
+        let Self { block, samplers, quad, radiance, two_sided, dimension, members, shared, out } = self;
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         samplers.pairs(dimension, &mut x, &mut y);
-        sample_quad([&x, &y], block, quad, radiance, [two_sided, shared], out);
+        sample_quad([&x, &y], block, quad, radiance, [two_sided, shared], 1.0 / members, out);
     }
 }
 
@@ -268,6 +277,7 @@ fn sample_quad(
     quad: &Quad,
     radiance: &[Vec3; 4],
     [two_sided, shared]: [bool; 2],
+    part: f32,
     out: &mut Arrivals,
 ) {
     let sharing = f32::from(u8::from(shared));
@@ -283,8 +293,8 @@ fn sample_quad(
         let lit = (height > 0.0) | (two_sided & (height < 0.0));
         let lit = lit & (slope > 0.0) & (block.geometric_normal.get(i).dot(d) > 0.0) & (place.density > 0.0);
         let height = height.abs();
-        let irradiance = (slope / distance2) * (height / distance2) * (quad.area / place.density);
-        // The power heuristic: density of the bounce over that of this sample.
+        let irradiance = (slope / distance2) * (height / distance2) * (quad.area / place.density) * part;
+        // The power heuristic: density of the bounce over that of all samples of this light.
         let ratio = irradiance * (1.0 / PI) * sharing;
         let weight = irradiance * (1.0 / PI) / (1.0 + ratio * ratio);
         let left = radiance[0] + (radiance[2] - radiance[0]) * place.b;

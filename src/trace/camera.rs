@@ -199,7 +199,7 @@ impl Viewpoint {
 pub(super) const LENS: u32 = 1;
 
 /// Rays through the pixels with these top left `corners`, each at a place of its own in the pixel.
-pub(super) struct Look<'a> {
+pub(super) struct LookOut<'a> {
     pub viewpoint: &'a Viewpoint,
     pub size: UVec2,
     pub samplers: &'a SamplerRow<LANES>,
@@ -208,7 +208,7 @@ pub(super) struct Look<'a> {
     pub rays: &'a mut [Ray],
 }
 
-impl Job for Look<'_> {
+impl Job for LookOut<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -22,6 +22,9 @@ pub(super) struct Shadow {
     pub(super) key: u32,
 }
 
+/// Shadow rays that are worth tracing before the rest of a batch is shaded.
+const MANY: usize = 8192;
+
 /// Shadow rays in the order in which they are traced.
 #[derive(Debug, Default)]
 pub(super) struct RaysToLights {
@@ -33,10 +36,16 @@ pub(super) struct RaysToLights {
 }
 
 impl Batch {
+    /// [`Batch::connect_lights`] if there are many: more would only need more memory. (Those of a path are queued together.)
+    pub(super) fn connect_many(&mut self, scene: &TraceScene) -> u64 {
+        if self.shadows.len() > MANY { self.connect_lights(scene) } else { 0 }
+    }
+
     /// Adds the light of those queued shadow rays that nothing blocks; returns how many were traced.
     pub(super) fn connect_lights(&mut self, scene: &TraceScene) -> u64 {
         let Self { shadows, rays_to_lights: RaysToLights { order, rays, ignored, blocked }, .. } = self;
-        // Rays to one light go similar ways. The sum of a path does not depend on its neighbours.
+        // Rays to one light go similar ways; of one light in the order of the queue, so that the sum of a path does not depend on
+        // its neighbours.
         order.clear();
         let waiting = (0_u64..).zip(&*shadows);
         let clear = waiting.filter(|(_, shadow)| !scene.lights.blocks(&shadow.ray, shadow.light));
@@ -73,7 +82,7 @@ impl Batch {
         bsdf: &Bsdf,
         followed: Lobes,
         &Pick { light, chance }: &Pick,
-        [member, members]: [u32; 2],
+        sampler: &Sampler,
         sample: &LightSample,
     ) {
         let Evaluated { diffuse, glossy, pdf: bounce_pdf } = bsdf.evaluate(sample.wi, followed);
@@ -86,7 +95,7 @@ impl Batch {
                 (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
             }
         };
-        let mut contribution = path.throughput * weight * sample.radiance / members as f32;
+        let mut contribution = path.throughput * weight * sample.radiance;
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, sample);
         }
@@ -108,19 +117,19 @@ impl Batch {
         }
         self.shadows.push(Shadow {
             entry: path.entry,
-            sampler: path.sampler,
+            sampler: *sampler,
             ray,
             light,
             triangle: sample.triangle,
             contribution,
-            key: shadow_key(light, path.depth, member),
+            key: shadow_key(light, path.depth),
         });
     }
 }
 
 /// Of the random numbers that a shadow ray needs on its way.
-pub(super) fn shadow_key(light: u32, depth: u32, member: u32) -> u32 {
-    light.wrapping_add(depth << 16).wrapping_add(member << 24).wrapping_add(1 << 31)
+pub(super) fn shadow_key(light: u32, depth: u32) -> u32 {
+    light.wrapping_add(depth << 16).wrapping_add(1 << 31)
 }
 
 /// What is left after that way (J. H. Lambert, "Photometria", 1760; A. Beer, 1852).

@@ -7,27 +7,29 @@ use super::bsdf::normal::facing;
 use super::connect::{Shadow, mesh_emission, power_heuristic, shadow_key};
 use super::film::Tile;
 use super::integrator::{
-    Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, PICK, Path, ROULETTE_DEPTH,
+    Batch, Bounce, DIRECTION, LIGHT, LOBE, Look, PAIRS_PER_BOUNCE, Path, ROULETTE_DEPTH, looks,
 };
 use super::light::FlatLight;
 use super::light_tree::Receiver;
 use super::lights::Pick;
 use super::quad_arrivals::{compute_quad, sample_quad};
 use super::reuse::{End, Start};
+use super::sampler::SamplerRow;
 use super::shape_light::Shape;
 use super::sightlines::{Sightlines, Window};
 use super::surface::Interaction;
 use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec3};
 use std::f32::consts::PI;
 
 /// Where paths of a wave have met diffuse surfaces, and what is needed to go on from there.
 #[derive(Debug, Default)]
 pub(super) struct Diffuse {
-    /// Paths by what their points need: on flat surfaces where something is known of lights, elsewhere, on those that are
-    /// placed elsewhere than their mesh is, and on surfaces that are textured or smooth.
-    kinds: [Vec<Arrived>; KINDS],
+    /// Paths on flat surfaces of one colour.
+    flat: Vec<Arrived>,
+    /// Paths on surfaces that are smooth, or of which each place has a colour of its own.
+    other: Vec<Arrived>,
     /// If anybody wants to know what is in the way.
     window: Option<Window>,
     /// Whether camera rays may run into lights.
@@ -43,20 +45,16 @@ pub(super) struct Diffuse {
     departures: Box<Departures>,
 }
 
-/// Number of a path, and what [`Sightlines::of`] says.
+/// Where a path has arrived.
 #[derive(Clone, Copy, Debug)]
 struct Arrived {
     path: u32,
+    /// What [`Sightlines::of`] says.
     known: Option<u32>,
-    instance: u32,
+    /// The instance, if it is elsewhere than its mesh was made.
+    placed: Option<u32>,
 }
 
-const PLACED: usize = 2;
-const OTHER: usize = 3;
-const KINDS: usize = 4;
-
-/// So many shadow rays are traced before the rest of a batch is shaded.
-const SHADOWS: usize = 8192;
 /// So many answers are at hand.
 const ASKED: usize = 64;
 
@@ -86,14 +84,10 @@ impl Diffuse {
         let flat = data.mesh.normals.is_empty()
             && data.mesh.colors.is_empty()
             && scene.surface_at(hit).1.base_color_texture.is_none();
-        let kind = if !flat {
-            OTHER
-        } else if !scene.geometry.tlas.placements()[hit.instance as usize].is_identity() {
-            PLACED
-        } else {
-            usize::from(known.is_none())
-        };
-        self.kinds[kind].push(Arrived { path: path as u32, known, instance: hit.instance });
+        let is_there = scene.geometry.tlas.placements()[hit.instance as usize].is_identity();
+        let placed = (!is_there).then_some(hit.instance);
+        let kind = if flat { &mut self.flat } else { &mut self.other };
+        kind.push(Arrived { path: path as u32, known, placed });
     }
 
     fn ask(&mut self, scene: &TraceScene, hit: &Hit) -> Option<u32> {
@@ -121,16 +115,16 @@ impl Batch {
     /// What comes from all points that [`Diffuse::add`] has noted. Returns how many shadow rays have been traced for that.
     pub(super) fn shade_diffuse(&mut self, scene: &TraceScene) -> u64 {
         let mut rays = 0;
-        for kind in 0..KINDS {
-            let mut points = std::mem::take(&mut self.diffuse.kinds[kind]);
-            // What is in the way is asked once for all who know the same.
-            points.sort_by_key(|arrived| (if kind == PLACED { arrived.instance } else { 0 }, arrived.known));
-            let of_one = |a: &Arrived, b: &Arrived| kind != PLACED || a.instance == b.instance;
-            for chunk in points.chunk_by(of_one).flat_map(|run| run.chunks(LANES)) {
+        let mut flat = std::mem::take(&mut self.diffuse.flat);
+        let mut other = std::mem::take(&mut self.diffuse.other);
+        // What is in the way is asked once for all who know the same, and a placement is looked up once.
+        flat.sort_by_key(|arrived| (arrived.placed, arrived.known));
+        for (points, is_flat) in [(&flat, true), (&other, false)] {
+            for chunk in points.chunks(LANES) {
                 let like = self.path(chunk[0].path as usize).sampler;
                 let mut block = self.diffuse.block.take().unwrap_or_else(|| Box::new(Block::new(like)));
-                self.fill(scene, &mut block, chunk, kind);
-                if kind < OTHER {
+                self.fill(scene, &mut block, chunk, is_flat);
+                if is_flat {
                     self.note_ends(&block);
                 }
                 self.diffuse.counted.clear();
@@ -140,17 +134,16 @@ impl Batch {
                     self.follow_block(scene, &block);
                 }
                 self.diffuse.block = Some(block);
-                if self.shadows.len() > SHADOWS {
-                    rays += self.connect_lights(scene);
-                }
+                rays += self.connect_many(scene);
             }
-            self.diffuse.kinds[kind] = points;
-            self.diffuse.kinds[kind].clear();
         }
+        flat.clear();
+        other.clear();
+        (self.diffuse.flat, self.diffuse.other) = (flat, other);
         rays
     }
 
-    fn fill(&mut self, scene: &TraceScene, block: &mut Block, points: &[Arrived], kind: usize) {
+    fn fill(&mut self, scene: &TraceScene, block: &mut Block, points: &[Arrived], is_flat: bool) {
         block.count = points.len();
         for (i, arrived) in points.iter().enumerate() {
             let path = self.path(arrived.path as usize);
@@ -160,7 +153,7 @@ impl Batch {
             block.samplers.set(i, &path.sampler);
             let (instance, surface) = scene.surface_at(hit);
             let mut albedo = surface.material.base_color;
-            if kind < OTHER {
+            if is_flat {
                 let corners = instance.mesh.corners(hit.triangle as usize);
                 for (rows, corner) in block.corners.iter_mut().zip(corners) {
                     rows.set(i, corner);
@@ -177,13 +170,16 @@ impl Batch {
             }
             block.throughput.set(i, path.throughput * albedo);
         }
-        if kind < OTHER {
-            let instance = points[0].instance as usize;
-            let placed = (kind == PLACED).then(|| Placed {
-                world_from_local: *scene.geometry.tlas.placements()[instance].world_from_local(),
-                normal_matrix: scene.geometry.instances[instance].normal_matrix,
-            });
-            block.find_points(scene.geometry.tlas.isa(), placed.as_ref());
+        if is_flat {
+            let mut first = 0;
+            for run in points.chunk_by(|a, b| a.placed == b.placed) {
+                let placed = run[0].placed.map(|instance| Placed {
+                    world_from_local: *scene.geometry.tlas.placements()[instance as usize].world_from_local(),
+                    normal_matrix: scene.geometry.instances[instance as usize].normal_matrix,
+                });
+                block.find_points(scene.geometry.tlas.isa(), first..first + run.len(), placed.as_ref());
+                first += run.len();
+            }
         }
     }
 
@@ -202,18 +198,11 @@ impl Batch {
     fn light_block(&mut self, scene: &TraceScene, block: &Block) {
         let depth = self.path(block.paths[0] as usize).depth;
         let base = 1 + depth * PAIRS_PER_BOUNCE;
-        let members = |light| {
-            let members = scene.light_samples(depth, light);
-            (0..members).map(move |member| [member, members])
-        };
         if !scene.lights.samples_all(depth) {
             for i in 0..block.count {
                 let to = Receiver { point: block.position.get(i), normal: block.normal.get(i) };
-                for member in members(None) {
-                    let sampler = block.samplers.get(i).member(member);
-                    let random = sampler.pair(base + LIGHT);
-                    let pick = scene.lights.pick(depth, 0, &to, sampler.pair(base + PICK).x);
-                    self.light_point(scene, block, i, &pick, member, random);
+                for look in looks(scene, block.samplers.get(i), depth, to) {
+                    self.light_point(scene, block, i, &look);
                 }
             }
             return;
@@ -229,18 +218,25 @@ impl Batch {
                     if missing == 0 {
                         continue;
                     }
-                    for member in members(Some(light)) {
-                        let samplers = block.samplers.members(member);
-                        sample_quad(scene, block, &samplers, shape, dimension, &mut arrivals);
-                        self.take_sampled(block, light, depth, member, &arrivals);
+                    let members = scene.light_samples(depth, Some(light));
+                    for member in 0..members {
+                        let samplers = block.samplers.members([member, members]);
+                        sample_quad(scene, block, &samplers, shape, [dimension, members], &mut arrivals);
+                        self.take_sampled(block, &samplers, light, depth, &arrivals);
                     }
                 }
                 _ => {
-                    let pick = Pick { light, chance: 1.0 };
+                    let members = scene.light_samples(depth, Some(light));
+                    let pick = Pick { light, chance: members as f32 };
                     for i in 0..block.count {
-                        for member in members(Some(light)) {
-                            let random = block.samplers.get(i).member(member).pair(dimension);
-                            self.light_point(scene, block, i, &pick, member, random);
+                        for member in 0..members {
+                            let sampler = block.samplers.get(i).member([member, members]);
+                            self.light_point(
+                                scene,
+                                block,
+                                i,
+                                &Look { pick, sampler, u: sampler.pair(dimension) },
+                            );
                         }
                     }
                 }
@@ -262,14 +258,13 @@ impl Batch {
     fn take_sampled(
         &mut self,
         block: &Block,
+        samplers: &SamplerRow<LANES>,
         light: u32,
         depth: u32,
-        [member, members]: [u32; 2],
         arrivals: &Arrivals,
     ) {
-        let part = 1.0 / members as f32;
         for i in 0..block.count {
-            let contribution = arrivals.contribution.get(i) * part;
+            let contribution = arrivals.contribution.get(i);
             if arrivals.certain[i] || contribution == Vec3::ZERO {
                 continue;
             }
@@ -277,29 +272,23 @@ impl Batch {
             let ray = Ray { origin, direction: arrivals.target.get(i) - origin, t_max: 1.0 };
             // A light nearer than rounding has no ray to it, and nothing fits between.
             if ray.direction != Vec3::ZERO {
-                let key = shadow_key(light, depth, member);
-                let (entry, sampler) = (self.entry(block.paths[i] as usize), block.samplers.get(i));
+                let (entry, sampler) = (self.entry(block.paths[i] as usize), samplers.get(i));
+                let key = shadow_key(light, depth);
                 self.shadows.push(Shadow { entry, sampler, ray, light, triangle: None, contribution, key });
             }
         }
     }
 
-    /// Samples any light for one point: sample number `member` of `members`.
-    fn light_point(
-        &mut self,
-        scene: &TraceScene,
-        block: &Block,
-        i: usize,
-        &Pick { light, chance }: &Pick,
-        [member, members]: [u32; 2],
-        random: Vec2,
-    ) {
+    /// Samples any light for one point.
+    fn light_point(&mut self, scene: &TraceScene, block: &Block, i: usize, look: &Look) {
+        let Look { pick: Pick { light, chance }, sampler, u } = *look;
         let path = self.path(block.paths[i] as usize);
         let (position, normal, geometric) =
             (block.position.get(i), block.normal.get(i), block.geometric_normal.get(i));
-        let Some(sample) = scene.lights.get(light).sample(position, normal, random) else { return };
+        let Some(sample) = scene.lights.get(light).sample(position, normal, u) else { return };
         let cosine = normal.dot(sample.wi);
-        if cosine <= 0.0 || geometric.dot(sample.wi) <= 0.0 {
+        // Not of a triangle without a normal.
+        if !(cosine > 0.0 && geometric.dot(sample.wi) > 0.0) {
             return;
         }
         let weight = match sample.pdf {
@@ -313,7 +302,7 @@ impl Batch {
                 cosine * shared / (PI * light_pdf)
             }
         };
-        let mut contribution = block.throughput.get(i) * sample.radiance * (weight / members as f32);
+        let mut contribution = block.throughput.get(i) * sample.radiance * weight;
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, &sample);
         }
@@ -326,8 +315,8 @@ impl Batch {
             None => Ray::new(origin, sample.wi),
         };
         if ray.direction != Vec3::ZERO {
-            let key = shadow_key(light, path.depth, member);
-            let (entry, sampler, triangle) = (path.entry, path.sampler, sample.triangle);
+            let key = shadow_key(light, path.depth);
+            let (entry, triangle) = (path.entry, sample.triangle);
             self.shadows.push(Shadow { entry, sampler, ray, light, triangle, contribution, key });
         }
     }

@@ -4,7 +4,7 @@ use super::TraceScene;
 use super::bsdf::Bsdf;
 use super::camera::LENS;
 use super::connect::Shadow;
-use super::integrator::{Batch, Path};
+use super::integrator::{Batch, Look, Path, looks};
 use super::light::FlatLight;
 use super::light_tree::Receiver;
 use super::sampler::Sampler;
@@ -178,16 +178,16 @@ impl Explanation {
         }
         let at = Interaction::new(scene, instance, &hit, &path.ray);
         batch.scatter(scene, path, surface, &at);
-        self.sampled(scene, batch, path, &at, &at.bsdf(scene, surface));
+        self.sampled(scene, path, &at, &at.bsdf(scene, surface));
     }
 
     /// Notes the lights that were sampled: the same numbers choose the same points.
-    fn sampled(&mut self, scene: &TraceScene, batch: &mut Batch, path: &Path, at: &Interaction, bsdf: &Bsdf) {
+    fn sampled(&mut self, scene: &TraceScene, path: &Path, at: &Interaction, bsdf: &Bsdf) {
         if !bsdf.has_smooth_lobes() || scene.lights.is_empty() {
             return;
         }
         let to = Receiver { point: at.position, normal: bsdf.normal() };
-        batch.each_pick(scene, path, &to, |_, pick, _, u| {
+        for Look { pick, u, .. } in looks(scene, path.sampler, path.depth, to) {
             let sample = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u);
             let row = self.row(scene, path.depth, pick.light);
             row.samples += 1;
@@ -196,7 +196,7 @@ impl Explanation {
                 let [least, most] = row.pdf.unwrap_or([pdf; 2]);
                 row.pdf = Some([least.min(pdf), most.max(pdf)]);
             }
-        });
+        }
     }
 
     /// Notes a ray to a light, and whether it comes through.
@@ -220,7 +220,7 @@ impl Explanation {
         row.dark = row.dark.saturating_sub(1);
         row.visits[0] += visits.nodes as f32;
         row.visits[1] += visits.triangles as f32;
-        // Of several samples that are taken together each brings its part.
+        // As if it were the only one.
         row.unblocked += luminance(shadow.contribution) * together as f32;
         if !blocked {
             self.radiance[shadow.entry as usize] += shadow.contribution;

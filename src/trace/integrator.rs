@@ -1,12 +1,12 @@
 //! Follows light back from the eye: all paths of a batch together, one bounce at a time.
 //!
 //! Each wave is four steps over whole batches: trace, shade (which queues shadow rays), trace the
-//! shadows, keep the paths that go on. The result for a sample is a function of its
+//! shadows (or sooner, if they are many), keep the paths that go on. The result for a sample is a function of its
 //! [`Sampler`] alone, so it does not matter who shares the batch.
 
 use super::block::LANES;
 use super::bsdf::Lobes;
-use super::camera::Look;
+use super::camera::LookOut;
 use super::connect::{RaysToLights, Shadow, passed, power_heuristic};
 use super::diffuse::Diffuse;
 use super::film::Tile;
@@ -103,6 +103,37 @@ pub(super) const LIGHT: u32 = 4;
 /// From this depth on a path may end by chance.
 pub(super) const ROULETTE_DEPTH: u32 = 4;
 
+/// One sample of a light, to be taken from a vertex.
+pub(super) struct Look {
+    /// The light; and how many such looks at it are expected at this vertex.
+    pub(super) pick: Pick,
+    /// Its own: for what is in the way.
+    pub(super) sampler: Sampler,
+    /// Random numbers: where on the light.
+    pub(super) u: Vec2,
+}
+
+/// All that are taken at a vertex after `depth` bounces.
+pub(super) fn looks<'a>(
+    scene: &'a TraceScene<'a>,
+    sampler: Sampler,
+    depth: u32,
+    to: Receiver,
+) -> impl Iterator<Item = Look> + 'a {
+    let base = 1 + depth * PAIRS_PER_BOUNCE;
+    let by_chance = !scene.lights.samples_all(depth);
+    (0..scene.lights.picks(depth)).flat_map(move |index| {
+        let members = scene.light_samples(depth, (!by_chance).then_some(index as u32));
+        (0..members).map(move |member| {
+            let sampler = sampler.member([member, members]);
+            let random = if by_chance { sampler.pair(base + PICK).x } else { 0.0 };
+            let mut pick = scene.lights.pick(depth, index, &to, random);
+            pick.chance *= members as f32;
+            Look { pick, sampler, u: sampler.pair(base + LIGHT + index as u32 * 2) }
+        })
+    })
+}
+
 impl Batch {
     /// Notes which samples of `tile` come next, as many as are followed together. False if there is none.
     pub fn begin(&mut self, scene: &TraceScene, tile: &Tile, work: Work) -> bool {
@@ -190,7 +221,7 @@ impl Batch {
                 samplers.set(i, &halves[sample as usize & 1].at(sample));
             }
             let (viewpoint, samplers) = (scene.viewpoint, &samplers);
-            scene.geometry.tlas.isa().run(Look { viewpoint, size, samplers, corners: [&x, &y], rays });
+            scene.geometry.tlas.isa().run(LookOut { viewpoint, size, samplers, corners: [&x, &y], rays });
         }
     }
 
@@ -233,6 +264,7 @@ impl Batch {
         self.hits = hits;
         for i in 0..self.rays.len() {
             self.arrive(scene, i);
+            rays.shadow += self.connect_many(scene);
         }
         rays.shadow += self.shade_diffuse(scene);
         rays.shadow += self.connect_lights(scene);
@@ -312,33 +344,10 @@ impl Batch {
             if light < u32::BITS && bounce.counted >> light & 1 == 1 {
                 return 0.0;
             }
-            let light_pdf = pdf * scene.lights.chance(path.depth - 1, light, &bounce.from);
+            let light_pdf = pdf * scene.expected_looks(path.depth - 1, light, &bounce.from);
             power_heuristic(bounce.pdf, light_pdf)
         });
         self.radiance[path.entry as usize] += path.throughput * radiance * weight;
-    }
-
-    /// Calls `visit` for each light sample to be taken where `path` is: with the light, which sample of how many, and random
-    /// numbers.
-    pub(super) fn each_pick(
-        &mut self,
-        scene: &TraceScene,
-        path: &Path,
-        to: &Receiver,
-        mut visit: impl FnMut(&mut Self, &Pick, [u32; 2], Vec2),
-    ) {
-        let base = 1 + path.depth * PAIRS_PER_BOUNCE;
-        let by_chance = !scene.lights.samples_all(path.depth);
-        for index in 0..scene.lights.picks(path.depth) {
-            let light = (!by_chance).then_some(index as u32);
-            let members = scene.light_samples(path.depth, light);
-            for member in (0..members).map(|member| [member, members]) {
-                let sampler = path.sampler.member(member);
-                let random = if by_chance { sampler.pair(base + PICK).x } else { 0.0 };
-                let pick = scene.lights.pick(path.depth, index, to, random);
-                visit(self, &pick, member, sampler.pair(base + LIGHT + index as u32 * 2));
-            }
-        }
     }
 
     /// Queues shadow rays to lights, and the ray that goes on.
@@ -352,11 +361,11 @@ impl Batch {
             Integrator::Path => Lobes::ALL,
         };
         if bsdf.has_smooth_lobes() && !scene.lights.is_empty() {
-            self.each_pick(scene, path, &to, |batch, pick, member, u| {
+            for Look { pick, sampler, u } in looks(scene, path.sampler, path.depth, to) {
                 if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {
-                    batch.connect(scene, path, at, &bsdf, followed, pick, member, &sample);
+                    self.connect(scene, path, at, &bsdf, followed, &pick, &sampler, &sample);
                 }
-            });
+            }
         }
         if !bsdf.has(followed) {
             return;

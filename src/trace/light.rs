@@ -94,7 +94,7 @@ impl LightSample {
 }
 
 impl FlatLight {
-    /// Whether it is so many that a tree chooses among them.
+    /// Many triangles, among which a tree chooses.
     #[must_use]
     pub fn is_many(&self) -> bool {
         matches!(self, Self::Mesh(mesh) if mesh.is_many())

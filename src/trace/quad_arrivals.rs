@@ -48,13 +48,13 @@ pub(super) fn compute_quad(
     missing
 }
 
-/// A sample of a parallelogram light for each point for which `out` is not certain.
+/// A sample of a parallelogram light, one of `members`, for each point for which `out` is not certain.
 pub(super) fn sample_quad(
     scene: &TraceScene,
     block: &Block,
     samplers: &SamplerRow<LANES>,
     shape: &ShapeLight,
-    dimension: u32,
+    [dimension, members]: [u32; 2],
     out: &mut Arrivals,
 ) {
     let Shape::Parallelogram(quad) = &shape.shape else { return };
@@ -67,25 +67,35 @@ pub(super) fn sample_quad(
         radiance,
         two_sided,
         dimension,
+        members: members as f32,
         shared,
         out,
     });
     for i in 0..block.count {
         if out.near[i] {
             let random = samplers.get(i).pair(dimension);
-            sample_near(block, i, shape, random, shared, out);
+            sample_near(block, i, shape, (random, members as f32), shared, out);
         }
     }
 }
 
 /// A sample of a light that is near one point.
-fn sample_near(block: &Block, i: usize, shape: &ShapeLight, random: Vec2, shared: bool, out: &mut Arrivals) {
+fn sample_near(
+    block: &Block,
+    i: usize,
+    shape: &ShapeLight,
+    (random, members): (Vec2, f32),
+    shared: bool,
+    out: &mut Arrivals,
+) {
     out.contribution.set(i, Vec3::ZERO);
     let normal = block.normal.get(i);
     let Some(sample) = shape.sample(block.position.get(i), normal, random) else { return };
     let (Some(pdf), Some(target)) = (sample.pdf, sample.target) else { return };
+    let pdf = pdf * members;
     let cosine = normal.dot(sample.wi);
-    if cosine <= 0.0 || block.geometric_normal.get(i).dot(sample.wi) <= 0.0 {
+    // Not of a triangle without a normal.
+    if !(cosine > 0.0 && block.geometric_normal.get(i).dot(sample.wi) > 0.0) {
         return;
     }
     let weight = if shared { power_heuristic(pdf, cosine / PI) } else { 1.0 };

@@ -65,10 +65,11 @@ impl Sampler {
         Self { seed: hash(self.seed ^ 0x2545_f491), ..self.member([member, members]) }
     }
 
-    /// Number `member` of `members` samples of lights that this sample takes: over all samples they are one sequence.
+    /// Number `member` of `members` samples of lights that this sample takes: over all samples they are one sequence, if a pair is
+    /// always asked for with the same number of members.
     #[must_use]
-    pub fn member(self, [member, members]: [u32; 2]) -> Self {
-        Self { index: self.index.wrapping_mul(members).wrapping_add(member), ..self }
+    pub fn member(self, member: [u32; 2]) -> Self {
+        Self { index: member_index(self.index, member), ..self }
     }
 
     /// The same, its numbers spread as `settings` say.
@@ -149,8 +150,8 @@ impl<const N: usize> SamplerRow<N> {
 
     /// [`Sampler::member`] of each.
     #[must_use]
-    pub fn members(&self, [member, members]: [u32; 2]) -> Self {
-        Self { indices: self.indices.map(|index| index.wrapping_mul(members).wrapping_add(member)), ..*self }
+    pub fn members(&self, member: [u32; 2]) -> Self {
+        Self { indices: self.indices.map(|index| member_index(index, member)), ..*self }
     }
 
     /// [`Sampler::pair`] of each.
@@ -169,6 +170,10 @@ impl<const N: usize> SamplerRow<N> {
             }
         }
     }
+}
+
+fn member_index(index: u32, [member, members]: [u32; 2]) -> u32 {
+    index.wrapping_mul(members).wrapping_add(member)
 }
 
 fn pixel_seed(pixel: UVec2, half: u32, seed: u32) -> u32 {

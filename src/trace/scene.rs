@@ -1,6 +1,7 @@
 //! The scene as rays need it: flat arrays, indices for references.
 
 use super::bsdf::Passed;
+use super::light_tree::Receiver;
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
@@ -156,11 +157,18 @@ impl<'a> TraceScene<'a> {
             _ if depth > 0 => 1,
             // All samples of a light without extent are the same.
             Some(light) if !light.has_extent() => 1,
-            // Which of many, and where on it.
+            // A choice among many varies more than where on one: as many for it again.
             Some(light) if light.is_many() => count.saturating_mul(count),
             None if self.lights.len() > super::mesh_light::FEW => count.saturating_mul(count),
             _ => count,
         }
+    }
+
+    /// How many samples of `light` are expected to be taken at a vertex after `depth` bounces.
+    #[must_use]
+    pub fn expected_looks(&self, depth: u32, light: u32, to: &Receiver) -> f32 {
+        let certain = self.lights.samples_all(depth).then_some(light);
+        self.lights.chance(depth, light, to) * self.light_samples(depth, certain) as f32
     }
 
     /// `texture` at the first or second of `uvs`, white where there is none.
