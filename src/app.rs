@@ -9,7 +9,7 @@ use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, Render
 use crate::trace::noise;
 use crate::trace::{
     Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, Viewpoint, trace_adaptive,
-    trace_pass,
+    trace_half, trace_pass,
 };
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
@@ -265,6 +265,11 @@ pub fn trace_frame(
     }
     let in_time = || budget.time.is_none_or(|time| start.elapsed() < time);
     let keep_going = || in_time() && !budget.interrupt.load(Ordering::Relaxed);
+    // Paths are shared among pixels of one colour: halves take no longer than the whole.
+    let halves = budget.adaptive && !budget.preview && scene.settings.shares_paths();
+    if halves && film.complete_samples() == 0 && target > 0 {
+        rays = rays + trace_half(&scene, &mut film, keep_going);
+    }
     while film.complete_samples() < target && keep_going() {
         let step = budget.pass_samples;
         rays = rays

@@ -1,9 +1,11 @@
 //! Pictures on disk.
 
+use super::compare::LinearImage;
 use super::develop::Display;
-use super::develop::develop;
+use super::develop::{develop, develop_image};
 use crate::trace::Film;
-use glam::Vec3;
+use crate::trace::film::Tile;
+use glam::{DVec3, IVec2, UVec2, Vec3};
 use image::{ImageFormat, Rgb32FImage, RgbaImage};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -71,7 +73,12 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
     let codec = |source| ImageError::Codec { path: path.to_path_buf(), source };
     match format {
         PictureFormat::Png => {
-            let image = RgbaImage::from_raw(size.x, size.y, develop(film, None, display)).unwrap_or_default();
+            let developed = if film.tiles().iter().any(Tile::is_half) {
+                develop_image(&LinearImage::of(film), display)
+            } else {
+                develop(film, None, display)
+            };
+            let image = RgbaImage::from_raw(size.x, size.y, developed).unwrap_or_default();
             let image = image::DynamicImage::from(image).into_rgb8();
             image.write_to(&mut bytes, ImageFormat::Png).map_err(codec)?;
         }
@@ -84,10 +91,28 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
     write_whole(path, bytes.get_ref())
 }
 
-/// Mean radiances, rows from the top.
+/// Mean radiances, rows from the top. What is still missing of the first samples is the mean of its neighbours.
 #[must_use]
 pub fn linear_pixels(film: &Film) -> Vec<Vec3> {
-    (0..film.size().y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean().as_vec3()).collect()
+    let size = film.size();
+    let mut pixels: Vec<Vec3> =
+        (0..size.y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean().as_vec3()).collect();
+    for tile in film.tiles().iter().filter(|tile| tile.is_half()) {
+        for (i, _) in (0..).zip(tile.pixels()).filter(|(_, pixel)| pixel.count() == 0) {
+            let at = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
+            let around = [(-1, 0), (1, 0), (0, -1), (0, 1)]
+                .map(|(x, y)| at.wrapping_add_signed(IVec2::new(x, y)))
+                .into_iter()
+                .filter(|there| there.cmplt(size).all())
+                .map(|there| film.pixel(there.x, there.y))
+                .filter(|pixel| pixel.count() > 0);
+            let (sum, count) = around.fold((DVec3::ZERO, 0.0), |(sum, n), p| (sum + p.mean(), n + 1.0));
+            if count > 0.0 {
+                pixels[(at.y * size.x + at.x) as usize] = (sum / count).as_vec3();
+            }
+        }
+    }
+    pixels
 }
 
 /// Writes beside `path` and renames, so that nobody ever sees half a file.

@@ -2,13 +2,14 @@
 
 use super::TraceScene;
 use super::bsdf::{Bsdf, Evaluated, Lobes};
-use super::integrator::{Batch, Path};
+use super::integrator::{Batch, LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
 use super::light::LightSample;
+use super::light_tree::Receiver;
 use super::lights::Pick;
 use super::sampler::Sampler;
 use super::surface::Interaction;
 use crate::bvh::{Hit, Ray};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// A ray toward a light, and what it brings if nothing is in the way.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +21,37 @@ pub(super) struct Shadow {
     pub(super) triangle: Option<(u32, u32)>,
     pub(super) contribution: Vec3,
     pub(super) key: u32,
+}
+
+/// One sample of a light, to be taken from a vertex.
+pub(super) struct Look {
+    /// The light; and how many such looks at it are expected at this vertex.
+    pub(super) pick: Pick,
+    /// Its own: for what is in the way.
+    pub(super) sampler: Sampler,
+    /// Random numbers: where on the light.
+    pub(super) u: Vec2,
+}
+
+/// All that are taken at a vertex after `depth` bounces.
+pub(super) fn looks<'a>(
+    scene: &'a TraceScene<'a>,
+    sampler: Sampler,
+    depth: u32,
+    to: Receiver,
+) -> impl Iterator<Item = Look> + 'a {
+    let base = 1 + depth * PAIRS_PER_BOUNCE;
+    let by_chance = !scene.lights.samples_all(depth);
+    (0..scene.lights.picks(depth)).flat_map(move |index| {
+        let members = scene.light_samples(depth, (!by_chance).then_some(index as u32));
+        (0..members).map(move |member| {
+            let sampler = sampler.member([member, members]);
+            let random = if by_chance { sampler.pair(base + PICK).x } else { 0.0 };
+            let mut pick = scene.lights.pick(depth, index, &to, random);
+            pick.chance *= members as f32;
+            Look { pick, sampler, u: sampler.pair(base + LIGHT + index as u32 * 2) }
+        })
+    })
 }
 
 /// Shadow rays that are worth tracing before the rest of a batch is shaded.

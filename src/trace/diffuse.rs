@@ -4,11 +4,9 @@
 
 use super::block::{Arrivals, Block, Depart, Departures, LANES, Placed};
 use super::bsdf::normal::facing;
-use super::connect::{Shadow, mesh_emission, power_heuristic, shadow_key};
+use super::connect::{Look, Shadow, looks, mesh_emission, power_heuristic, shadow_key};
 use super::film::Tile;
-use super::integrator::{
-    Batch, Bounce, DIRECTION, LIGHT, LOBE, Look, PAIRS_PER_BOUNCE, Path, ROULETTE_DEPTH, looks,
-};
+use super::integrator::{Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, Path, ROULETTE_DEPTH};
 use super::light::FlatLight;
 use super::light_tree::Receiver;
 use super::lights::Pick;

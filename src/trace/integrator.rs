@@ -7,12 +7,11 @@
 use super::block::LANES;
 use super::bsdf::Lobes;
 use super::camera::LookOut;
-use super::connect::{RaysToLights, Shadow, passed, power_heuristic};
+use super::connect::{Look, RaysToLights, Shadow, looks, passed, power_heuristic};
 use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::FlatLight;
 use super::light_tree::Receiver;
-use super::lights::Pick;
 use super::pass::RayCounts;
 use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
@@ -58,6 +57,8 @@ pub enum Work {
         /// The first that is not to be taken.
         until: u32,
     },
+    /// The pixels of one colour of the chess board the first sample, if it has none: half of the picture in half of the time.
+    Half,
     /// Each pixel its share.
     Shares {
         /// Samples per pixel of the picture beyond the even ones.
@@ -80,6 +81,8 @@ pub struct Batch {
     /// Top left corners and samplers of the tile's pixels.
     pub(super) pixels: Vec<(Vec2, [Sampler; 2])>,
     work: Work,
+    /// Only pixels of this one are looked at.
+    colour: Option<u32>,
     pub(super) paths: Vec<Path>,
     pub(super) next: Vec<Path>,
     pub(super) shadows: Vec<Shadow>,
@@ -103,37 +106,6 @@ pub(super) const LIGHT: u32 = 4;
 /// From this depth on a path may end by chance.
 pub(super) const ROULETTE_DEPTH: u32 = 4;
 
-/// One sample of a light, to be taken from a vertex.
-pub(super) struct Look {
-    /// The light; and how many such looks at it are expected at this vertex.
-    pub(super) pick: Pick,
-    /// Its own: for what is in the way.
-    pub(super) sampler: Sampler,
-    /// Random numbers: where on the light.
-    pub(super) u: Vec2,
-}
-
-/// All that are taken at a vertex after `depth` bounces.
-pub(super) fn looks<'a>(
-    scene: &'a TraceScene<'a>,
-    sampler: Sampler,
-    depth: u32,
-    to: Receiver,
-) -> impl Iterator<Item = Look> + 'a {
-    let base = 1 + depth * PAIRS_PER_BOUNCE;
-    let by_chance = !scene.lights.samples_all(depth);
-    (0..scene.lights.picks(depth)).flat_map(move |index| {
-        let members = scene.light_samples(depth, (!by_chance).then_some(index as u32));
-        (0..members).map(move |member| {
-            let sampler = sampler.member([member, members]);
-            let random = if by_chance { sampler.pair(base + PICK).x } else { 0.0 };
-            let mut pick = scene.lights.pick(depth, index, &to, random);
-            pick.chance *= members as f32;
-            Look { pick, sampler, u: sampler.pair(base + LIGHT + index as u32 * 2) }
-        })
-    })
-}
-
 impl Batch {
     /// Notes which samples of `tile` come next, as many as are followed together. False if there is none.
     pub fn begin(&mut self, scene: &TraceScene, tile: &Tile, work: Work) -> bool {
@@ -141,8 +113,20 @@ impl Batch {
         self.work = work;
         let pixels = tile.size.element_product();
         self.reuse.enter(scene, tile.size);
+        self.colour = match work {
+            _ if tile.half => Some(1),
+            Work::Half => Some(0),
+            _ => None,
+        };
         match work {
-            _ if self.reuse.on => self.begin_groups(tile, work, TOGETHER),
+            Work::Half if tile.half || pixels < 2 => {}
+            _ if self.reuse.on => self.begin_groups(tile, work, self.colour, TOGETHER),
+            _ if self.colour.is_some() => {
+                let colour = |i: u32| ((i % tile.size.x) ^ (i / tile.size.x)) & 1;
+                let own = (0..pixels).filter(|&i| self.colour == Some(colour(i)));
+                self.keys.extend(own.map(|i| (i, tile.next_sample)));
+            }
+            Work::Half => {}
             Work::Even { until } => {
                 let first = tile.next_sample;
                 let count = until.saturating_sub(first).min((TOGETHER / pixels).max(1));
@@ -199,6 +183,11 @@ impl Batch {
         }
         tile.dropped += dropped;
         match self.work {
+            Work::Half => tile.half = true,
+            Work::Even { .. } if tile.half => {
+                tile.half = false;
+                tile.next_sample += 1;
+            }
             Work::Even { .. } => tile.next_sample += (self.keys.len() / self.pixels.len()) as u32,
             Work::Shares { .. } => {
                 for key in &self.keys {

@@ -1,5 +1,6 @@
 //! Tiles over threads.
 
+use super::film::Tile;
 use super::integrator::{Batch, Work};
 use super::{Film, TraceScene, allot, reuse};
 use rayon::prelude::*;
@@ -54,6 +55,21 @@ pub fn trace_adaptive(
         film.allot(&shares);
     }
     rays
+}
+
+/// Gives the pixels of one colour of the chess board their first sample, if none has any, as long as `keep_going`: where
+/// time is short half of the picture everywhere is more than the upper half of it.
+pub fn trace_half(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() -> bool + Sync) -> RayCounts {
+    let (size, first) = (film.size(), film.first_sample());
+    let fresh = film.tiles_mut().par_iter_mut().filter(|tile| !tile.rests() && tile.next_sample == first);
+    let look = |batch: &mut Batch, tile: &mut Tile| {
+        let mut rays = RayCounts::default();
+        if keep_going() && batch.begin(scene, tile, Work::Half) {
+            batch.render(scene, tile, size, &mut rays);
+        }
+        rays
+    };
+    fresh.map_init(Batch::default, look).reduce(RayCounts::default, |a, b| a + b)
 }
 
 /// Brings all tiles to their share of `until` samples per pixel, `step` samples at a time, as long as `keep_going`.

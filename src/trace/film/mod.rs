@@ -46,6 +46,7 @@ impl Film {
                     origin,
                     size,
                     next_sample: first_sample,
+                    half: false,
                     more: Vec::new(),
                     shares: Vec::new(),
                     complete: 0,
@@ -66,6 +67,7 @@ impl Film {
         self.even_samples = 0;
         for tile in &mut self.tiles {
             tile.next_sample = first_sample;
+            tile.half = false;
             tile.more.clear();
             tile.shares.clear();
             tile.dropped = 0;
@@ -209,8 +211,9 @@ impl Film {
     #[must_use]
     pub fn mean_samples(&self) -> f64 {
         let of = |t: &Tile| {
-            let even = u64::from(t.next_sample - self.first_sample) * u64::from(t.size.element_product());
-            even + t.more.iter().map(|&n| u64::from(n)).sum::<u64>()
+            let pixels = u64::from(t.size.element_product());
+            let even = u64::from(t.next_sample - self.first_sample) * pixels;
+            even + u64::from(t.half) * pixels.div_ceil(2) + t.more.iter().map(|&n| u64::from(n)).sum::<u64>()
         };
         let pixels: u64 = self.working().map(|t| u64::from(t.size.element_product())).sum();
         self.working().map(of).sum::<u64>() as f64 / pixels as f64

@@ -13,6 +13,10 @@ pub struct Tile {
     pub size: UVec2,
     /// Index of the sample that comes next in each of its pixels, but for `more`.
     pub next_sample: u32,
+    /// Its pixels of the first colour of the chess board have one sample more than that says: see [`trace_half`].
+    ///
+    /// [`trace_half`]: crate::trace::pass::trace_half
+    pub(in crate::trace) half: bool,
     /// Samples beyond `next_sample` that each pixel has, in rows from the top. Empty before [`Film::allot`].
     pub(in crate::trace) more: Vec<u32>,
     /// How many each gets for each one that the picture gets on average; as many.
@@ -31,6 +35,12 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Whether only pixels of one colour have been looked at.
+    #[must_use]
+    pub fn is_half(&self) -> bool {
+        self.half
+    }
+
     /// Whether it gets no samples for now: see [`Film::confine`].
     #[must_use]
     pub fn rests(&self) -> bool {

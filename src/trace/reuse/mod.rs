@@ -184,13 +184,18 @@ impl Reuse {
 
 impl Batch {
     /// Notes which samples come next: as many of all members of a group.
-    pub(super) fn begin_groups(&mut self, tile: &Tile, work: Work, together: u32) {
+    pub(super) fn begin_groups(&mut self, tile: &Tile, work: Work, colour: Option<u32>, together: u32) {
         for group in 0..GROUPS {
+            if colour.is_some_and(|colour| colour as usize % GROUPS != group) {
+                continue;
+            }
             let members = std::mem::take(&mut self.reuse.groups.members[group]);
             if let Some(&leader) = members.first() {
                 let more = tile.more.get(leader as usize).copied().unwrap_or(0);
                 let first = tile.next_sample + more;
                 let count = match work {
+                    _ if colour.is_some() => 1,
+                    Work::Half => 0,
                     Work::Even { until } => {
                         let most = (together / tile.size.element_product()).max(1);
                         until.saturating_sub(first).min(most)

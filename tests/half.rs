@@ -1,0 +1,67 @@
+//! Half of the first samples, when there is no time for all.
+
+#[path = "support/stage.rs"]
+mod stage;
+
+use glam::{DAffine3, DVec3, Vec3};
+use penumbra::image::files::linear_pixels;
+use penumbra::scene::{Light, Material};
+use penumbra::trace::film::Tile;
+use penumbra::trace::{Film, Integrator, RenderSettings, trace_half, trace_pass};
+use stage::{Stage, quad, settings};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// A lit floor that fills a picture whose tiles are cut off at two borders.
+fn floor(integrator: Integrator) -> Stage {
+    let mut stage = Stage::new(RenderSettings { seed: 3, ..settings(29, 17, integrator, 3) });
+    let grey = Material { double_sided: true, ..Material::lambert(Vec3::splat(0.6)) };
+    stage.add_mesh(quad(Vec3::splat(-3.0), Vec3::X * 6.0, Vec3::Y * 6.0), grey, DAffine3::IDENTITY);
+    let light = Light::Point { intensity: Vec3::splat(9.0) };
+    stage.add(light, DAffine3::from_translation(DVec3::new(0.5, 0.2, 1.0)));
+    stage.look(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
+    stage.app.build();
+    stage
+}
+
+#[test]
+fn two_halves_are_the_whole() {
+    for integrator in [Integrator::Direct, Integrator::Path] {
+        let stage = floor(integrator);
+        let (scene, new) = (stage.scene(), || Film::new(stage.scene().settings.size, 0));
+        let mut whole = new();
+        trace_pass(&scene, &mut whole, 3, 3, || true);
+        // Broken off again and again.
+        let mut halves = new();
+        while !halves.tiles().iter().all(|tile| tile.is_half() || tile.size.element_product() < 2) {
+            let asked = AtomicU32::new(0);
+            trace_half(&scene, &mut halves, || asked.fetch_add(1, Ordering::Relaxed) % 3 != 2);
+            assert_eq!(halves.complete_samples(), 0);
+        }
+        assert!((halves.mean_samples() - 0.5).abs() < 0.02, "{}", halves.mean_samples());
+        while halves.complete_samples() < 3 {
+            let asked = AtomicU32::new(0);
+            trace_pass(&scene, &mut halves, 3, 1, || asked.fetch_add(1, Ordering::Relaxed) % 5 != 4);
+        }
+        assert_eq!(halves.mean_samples(), 3.0);
+        assert!(halves == whole, "{integrator:?}");
+    }
+}
+
+#[test]
+fn a_half_picture_has_no_holes() {
+    let stage = floor(Integrator::Direct);
+    let scene = stage.scene();
+    let picture = |film: &Film| linear_pixels(film);
+    let mut film = Film::new(scene.settings.size, 0);
+    trace_half(&scene, &mut film, || true);
+    let half = picture(&film);
+    let looked_at =
+        |film: &Film| (0..film.size().y).flat_map(|y| film.row(y)).filter(|pixel| pixel.count() > 0).count();
+    assert_eq!(looked_at(&film), half.len().div_ceil(2));
+    trace_pass(&scene, &mut film, 1, 1, || true);
+    for (guess, truth) in half.iter().zip(picture(&film)) {
+        assert!(truth.x > 0.0 && (guess.x / truth.x - 1.0).abs() < 0.15, "{guess} for {truth}");
+    }
+    film.reset();
+    assert!(!film.tiles().iter().any(Tile::is_half));
+}
