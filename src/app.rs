@@ -46,7 +46,8 @@ pub struct FrameBudget {
     /// Raised from outside to end refinement at the next tile (a key was pressed). The frame's
     /// runner lowers it. A preview, once begun, always completes.
     pub interrupt: Arc<AtomicBool>,
-    /// More samples go where there is more noise.
+    /// More samples go where there is more noise. And without a preview the first go to half of the pixels everywhere, if
+    /// neighbours share paths: no film in files is like that.
     pub adaptive: bool,
     /// Samples per pixel after which nothing more is traced.
     pub sample_target: u32,

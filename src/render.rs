@@ -6,7 +6,6 @@ use crate::image::compare::{CompareError, LinearImage};
 use crate::image::{Display, ErrorLog, ImageError, save};
 use crate::load::{Kind, LoadOptions, Phase, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
-use crate::trace::film::Tile;
 use crate::trace::{Film, Geometry, RayCounts, RenderSettings};
 use crate::watch::{Seen, Watch};
 use glam::UVec2;
@@ -132,6 +131,9 @@ pub struct RenderSummary {
     pub dropped_samples: u64,
     /// Most memory the process ever had, in bytes, where the system tells.
     pub peak_memory_bytes: Option<u64>,
+    /// The part of the pixels that has samples: less than 1 if there was not even time for one of each. Others show the mean of
+    /// their neighbours, or are black.
+    pub looked_at: f64,
     /// What loading had to say.
     pub warnings: Vec<String>,
     /// What was decided because the file is silent.
@@ -255,11 +257,6 @@ pub fn render(
     // Where somebody may want to go on, the film says how far it was to go.
     let planned = (job.noise.is_none() && target < u32::MAX - first_sample)
         .then(|| first_sample..first_sample + target.max(film.complete_samples()));
-    let mut warnings = report.warnings();
-    if film.tiles().iter().any(Tile::is_half) {
-        warnings
-            .push("no time for a sample of each pixel: some show the mean of their neighbours".to_owned());
-    }
     let display = *app.world.resource::<Display>();
     let header = identity.map(|identity| Header::new(identity, planned, &display));
     save_all(&job.outputs, film, &display, header.as_ref())?;
@@ -294,7 +291,8 @@ pub fn render(
         dropped_samples: stats.dropped,
         peak_memory_bytes: peak_memory(),
         load_phases: report.seconds.clone(),
-        warnings,
+        warnings: report.warnings(),
+        looked_at: film.looked_at(),
         decisions: report.decisions(),
         outputs: job.outputs.iter().map(|p| p.display().to_string()).collect(),
         interrupted: matches!(end, End::Interrupted),

@@ -91,13 +91,15 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
     write_whole(path, bytes.get_ref())
 }
 
-/// Mean radiances, rows from the top. What is still missing of the first samples is the mean of its neighbours.
+/// Mean radiances, rows from the top. Of a film that is half looked at, what is missing is the mean of its neighbours if any
+/// has been looked at.
 #[must_use]
 pub fn linear_pixels(film: &Film) -> Vec<Vec3> {
     let size = film.size();
     let mut pixels: Vec<Vec3> =
         (0..size.y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean().as_vec3()).collect();
-    for tile in film.tiles().iter().filter(|tile| tile.is_half()) {
+    let half = film.tiles().iter().any(Tile::is_half);
+    for tile in film.tiles().iter().filter(|_| half) {
         for (i, _) in (0..).zip(tile.pixels()).filter(|(_, pixel)| pixel.count() == 0) {
             let at = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
             let around = [(-1, 0), (1, 0), (0, -1), (0, 1)]

@@ -285,8 +285,7 @@ impl Batch {
             (block.position.get(i), block.normal.get(i), block.geometric_normal.get(i));
         let Some(sample) = scene.lights.get(light).sample(position, normal, u) else { return };
         let cosine = normal.dot(sample.wi);
-        // Not of a triangle without a normal.
-        if !(cosine > 0.0 && geometric.dot(sample.wi) > 0.0) {
+        if cosine <= 0.0 || geometric.dot(sample.wi) <= 0.0 {
             return;
         }
         let weight = match sample.pdf {

@@ -57,7 +57,7 @@ pub enum Work {
         /// The first that is not to be taken.
         until: u32,
     },
-    /// The pixels of one colour of the chess board the first sample, if it has none: half of the picture in half of the time.
+    /// The pixels of one colour of the chess board a sample, unless they have it: half of the picture in half of the time.
     Half,
     /// Each pixel its share.
     Shares {
@@ -82,7 +82,7 @@ pub struct Batch {
     pub(super) pixels: Vec<(Vec2, [Sampler; 2])>,
     work: Work,
     /// Only pixels of this one are looked at.
-    colour: Option<u32>,
+    pub(super) colour: Option<u32>,
     pub(super) paths: Vec<Path>,
     pub(super) next: Vec<Path>,
     pub(super) shadows: Vec<Shadow>,
@@ -119,8 +119,8 @@ impl Batch {
             _ => None,
         };
         match work {
-            Work::Half if tile.half || pixels < 2 => {}
-            _ if self.reuse.on => self.begin_groups(tile, work, self.colour, TOGETHER),
+            Work::Half if tile.half => {}
+            _ if self.reuse.on => self.begin_groups(tile, work, TOGETHER),
             _ if self.colour.is_some() => {
                 let colour = |i: u32| ((i % tile.size.x) ^ (i / tile.size.x)) & 1;
                 let own = (0..pixels).filter(|&i| self.colour == Some(colour(i)));

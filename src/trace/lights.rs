@@ -31,12 +31,12 @@ pub struct Lights {
     meshes: Vec<((u32, u16), u32)>,
 }
 
-/// A light picked for sampling, and the probability of that.
+/// A light picked for sampling, and how often.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pick {
     /// Number of the light.
     pub light: u32,
-    /// Expected number of times that it is picked: 1 if all lights are.
+    /// Expected number of times that it is picked at a vertex: 1 if all lights are, once each.
     pub chance: f32,
 }
 

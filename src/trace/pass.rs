@@ -64,7 +64,10 @@ pub fn trace_half(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() -> 
     let fresh = film.tiles_mut().par_iter_mut().filter(|tile| !tile.rests() && tile.next_sample == first);
     let look = |batch: &mut Batch, tile: &mut Tile| {
         let mut rays = RayCounts::default();
-        if keep_going() && batch.begin(scene, tile, Work::Half) {
+        // One pixel has no halves.
+        let is_one = tile.size.element_product() == 1;
+        let work = if is_one { Work::Even { until: first.saturating_add(1) } } else { Work::Half };
+        if keep_going() && batch.begin(scene, tile, work) {
             batch.render(scene, tile, size, &mut rays);
         }
         rays

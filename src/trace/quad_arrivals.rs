@@ -94,8 +94,7 @@ fn sample_near(
     let (Some(pdf), Some(target)) = (sample.pdf, sample.target) else { return };
     let pdf = pdf * members;
     let cosine = normal.dot(sample.wi);
-    // Not of a triangle without a normal.
-    if !(cosine > 0.0 && block.geometric_normal.get(i).dot(sample.wi) > 0.0) {
+    if cosine <= 0.0 || block.geometric_normal.get(i).dot(sample.wi) <= 0.0 {
         return;
     }
     let weight = if shared { power_heuristic(pdf, cosine / PI) } else { 1.0 };

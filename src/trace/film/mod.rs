@@ -174,6 +174,7 @@ impl Film {
     /// the share of one pixel is to be found from others.
     pub fn allot(&mut self, shares: &[f32]) {
         self.even_samples = self.complete_samples();
+        debug_assert!(!self.tiles.iter().any(Tile::is_half), "a half tile has no even number of samples");
         let across = self.size.x as usize;
         for tile in &mut self.tiles {
             let [x, y, width, height] =
@@ -217,6 +218,13 @@ impl Film {
         };
         let pixels: u64 = self.working().map(|t| u64::from(t.size.element_product())).sum();
         self.working().map(of).sum::<u64>() as f64 / pixels as f64
+    }
+
+    /// The part of the pixels worked on that has samples.
+    #[must_use]
+    pub fn looked_at(&self) -> f64 {
+        let pixels = || self.working().flat_map(Tile::pixels);
+        pixels().filter(|pixel| pixel.count() > 0).count() as f64 / pixels().count() as f64
     }
 
     /// Samples dropped because they were not finite.

@@ -184,7 +184,8 @@ impl Reuse {
 
 impl Batch {
     /// Notes which samples come next: as many of all members of a group.
-    pub(super) fn begin_groups(&mut self, tile: &Tile, work: Work, colour: Option<u32>, together: u32) {
+    pub(super) fn begin_groups(&mut self, tile: &Tile, work: Work, together: u32) {
+        let colour = self.colour;
         for group in 0..GROUPS {
             if colour.is_some_and(|colour| colour as usize % GROUPS != group) {
                 continue;
