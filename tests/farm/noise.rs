@@ -194,7 +194,7 @@ fn the_noise_is_the_true_error_over_a_hundred_runs() {
                  all runs {of_squares:.3}"
             );
             // The spread of one run is that of so small a picture: in the gallery few pixels have all the noise. It is also
-            // what makes the mean of ratios too large, but not that of squares, by half the square of the error's spread.
+            // what makes the mean of ratios too large, but not that of squares.
             assert!(
                 (of_squares - 1.0).abs() < 0.1 && spread < 0.4,
                 "{name} {integrator:?}: {of_squares} ± {spread}"
