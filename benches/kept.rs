@@ -8,10 +8,12 @@ mod flight;
 
 use flight::{HEAD, flights, fly, row};
 use glam::UVec2;
+use penumbra::preview::Preview;
 
 fn main() {
     println!("{HEAD}");
     for (scene, integrator, _) in flights() {
-        println!("{}", row(&scene, integrator, &fly(&scene, integrator, UVec2::new(960, 540), |took| took)));
+        let flight = fly(&scene, integrator, UVec2::new(960, 540), Preview::default, |took| took);
+        println!("{}", row(&scene, integrator, &flight));
     }
 }

@@ -12,6 +12,8 @@ pub struct Preview {
     seconds_per_pixel: Option<f64>,
     /// Seconds of a first picture that others need.
     reserved: f64,
+    /// Whether `scale` stays as it is.
+    fixed: bool,
 }
 
 /// Time that a preview may take, with what is carried over from the picture before.
@@ -26,11 +28,17 @@ const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
 impl Default for Preview {
     fn default() -> Self {
-        Self { film: None, scale: 8, seconds_per_pixel: None, reserved: 0.0 }
+        Self { film: None, scale: 8, seconds_per_pixel: None, reserved: 0.0, fixed: false }
     }
 }
 
 impl Preview {
+    /// As coarse as this, however fast the machine is: for pictures that are to be compared.
+    #[must_use]
+    pub fn at_scale(scale: u32) -> Self {
+        Self { scale: scale.max(1), fixed: true, ..Self::default() }
+    }
+
     /// Traces the whole picture once at the coarseness that fits the time, to the end, and returns its
     /// rays. At scale 1 it leaves that to the film itself and returns `None`.
     pub fn trace(&mut self, scene: &TraceScene) -> Option<RayCounts> {
@@ -76,7 +84,7 @@ impl Preview {
     }
 
     fn choose_scale(&mut self, pixels: f64) {
-        let Some(seconds_per_pixel) = self.seconds_per_pixel else { return };
+        let Some(seconds_per_pixel) = self.seconds_per_pixel.filter(|_| !self.fixed) else { return };
         let target = TARGET.as_secs_f64();
         let target = (target - self.reserved).max(OWN * target);
         let cost = |scale: u32| seconds_per_pixel * pixels / f64::from(scale * scale) / target;
@@ -106,5 +114,8 @@ mod tests {
         assert_eq!(at(3, 50.0), 3, "12.5 ms at half size would fit, but not with headroom");
         assert_eq!(at(2, 50.0), 2, "and so it stays from below");
         assert_eq!(at(2, 1e9), 16, "never coarser than 16");
+        let mut fixed = Preview { seconds_per_pixel: Some(1e9), ..Preview::at_scale(2) };
+        fixed.choose_scale(1.0);
+        assert_eq!(fixed.scale, 2, "unless told");
     }
 }
