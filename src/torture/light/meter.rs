@@ -152,17 +152,17 @@ pub struct Plan {
     pub id: &'static str,
     /// Where.
     pub places: &'static [Place],
-    /// Samples at first, of each spot, by effort; four times as many, and again, while the relative bound is too wide.
+    /// Samples at first, of each spot, by effort: see [`until_sure`].
     pub samples: [u64; 3],
     /// One line for all spots of a list, by place and by how they are measured, instead of one for each.
     pub together: bool,
 }
 
 impl Plan {
-    /// All places; 10⁶ samples, or 10⁸.
+    /// All places; as many samples as the bound needs, or 10⁸.
     #[must_use]
     pub const fn of(id: &'static str) -> Self {
-        Self { id, places: &Place::ALL, samples: [1 << 14, 1 << 18, 100_000_000], together: false }
+        Self { id, places: &Place::ALL, samples: [1 << 14, 1 << 16, 100_000_000], together: false }
     }
 
     fn at_first(&self, effort: Effort) -> u64 {
@@ -211,24 +211,43 @@ fn one(
     if !computed {
         ask.samples = plan.at_first(trial.effort).div_ceil(pixels) as u32;
     }
-    loop {
+    // No more than 16 million samples, or sixteen times as many as were meant to be.
+    let most = (1 << 16).max(16 * plan.at_first(trial.effort) / pixels) as u32;
+    until_sure(trial, [ask.samples, most], |samples| {
+        let ask = Ask { samples, ..ask };
         let reading = meter(&ask);
         let same = match &spot.expected {
             Expected::Same(other) => Some(meter(&Ask { spot: other, ..ask })),
             _ => None,
         };
-        // What is not complete is not judged.
+        judge(name, &ask, &reading, same.as_ref())
+    })
+}
+
+/// Checks by so many samples, from the first number to the second: twice as many, and again, while the standard errors are
+/// too wide; and four times more if the mean is too far off. Where few samples differ from the others, standard errors are
+/// known badly: what was chance goes away, what is wrong gets worse.
+///
+/// None if it was interrupted: what is not complete is not judged.
+pub fn until_sure(
+    trial: &Trial<'_>,
+    [mut samples, most]: [u32; 2],
+    mut measure: impl FnMut(u32) -> Vec<Check>,
+) -> Vec<Check> {
+    let mut again = 4;
+    loop {
+        let checks = measure(samples);
         if trial.interrupted() {
             return Vec::new();
         }
-        let checks = judge(name, &ask, &reading, same.as_ref());
-        let too_wide = |check: &Check| check.unit == "means" && !check.holds();
-        // No more than 16 million samples, or sixteen times as many as were meant to be.
-        let most = (1 << 16).max(16 * plan.at_first(trial.effort) / pixels) as u32;
-        if !checks.iter().any(too_wide) || ask.samples >= most {
+        let broken = |unit: &str| checks.iter().any(|check| check.unit == unit && !check.holds());
+        let too_wide = broken("means");
+        let may_be_chance = broken("samples") && again > 0;
+        if !(too_wide || may_be_chance) || samples >= most {
             return checks;
         }
-        ask.samples = ask.samples.saturating_mul(4);
+        again -= i32::from(!too_wide);
+        samples = samples.saturating_mul(2).min(most);
     }
 }
 
@@ -249,4 +268,41 @@ pub fn worst_of_each(checks: impl Iterator<Item = Check>) -> Vec<Check> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::torture::Effort;
+    use std::sync::atomic::AtomicBool;
+
+    /// Samples of each try for standard errors that fall by their root from 1 at one sample, and a mean off by that.
+    fn tries(off: impl Fn(u32) -> f64, bound: f64) -> (Vec<u32>, bool) {
+        let interrupt = AtomicBool::new(false);
+        let trial = Trial { effort: Effort::Quick, seed: 1, progress: &|_| {}, interrupt: &interrupt };
+        let mut all = Vec::new();
+        let checks = until_sure(&trial, [16, 4096], |samples| {
+            all.push(samples);
+            let sigma = f64::from(samples).sqrt().recip();
+            vec![
+                Check::new("off", u64::from(samples), "samples", off(samples) / sigma, SIGMAS),
+                Check::new("wide", 1, "means", SIGMAS * sigma, bound),
+            ]
+        });
+        (all, checks.iter().all(Check::holds))
+    }
+
+    #[test]
+    fn a_bound_that_is_too_wide_takes_more_samples_and_chance_goes_away() {
+        assert_eq!(tries(|_| 0.0, 2.0), (vec![16], true));
+        assert_eq!(tries(|_| 0.0, 0.5), (vec![16, 32, 64, 128], true));
+        assert_eq!(tries(|samples| if samples < 60 { 2.0 } else { 0.0 }, 2.0), (vec![16, 32, 64], true));
+    }
+
+    #[test]
+    fn what_is_wrong_stays_wrong_and_ends() {
+        assert_eq!(tries(|_| 1.2, 2.0), (vec![16, 32, 64, 128, 256], false));
+        assert_eq!(tries(|_| 0.0, 1e-9).0.last(), Some(&4096));
+        assert!(!tries(|_| f64::NAN, 2.0).1);
+    }
 }

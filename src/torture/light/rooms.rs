@@ -1,7 +1,7 @@
 //! L12 and L13: whole squares, and awkward places.
 
 use super::lamps::{LIMIT, quads};
-use super::meter::{Plan, SIGMAS, measure, ours, places, worst_of_each};
+use super::meter::{Plan, SIGMAS, measure, ours, places, until_sure, worst_of_each};
 use super::oracle;
 use super::spot::{ALBEDO, Expected, Spot, Thing, UNIT, opaque, panel, parallelogram, shining};
 use crate::scene::{Light, Material, TriangleMesh};
@@ -79,26 +79,27 @@ pub fn judge_form_factor(what: &str, samples: u64, factors: &[f64], exact: f64) 
 }
 
 fn form_factors(trial: &Trial<'_>) -> Vec<Check> {
-    let (pictures, samples) = (trial.pick(16, 16, 384), trial.pick(32, 32, 64) as u32);
+    let (pictures, samples) = (trial.pick(16, 16, 384), trial.pick(8, 8, 64) as u32);
     let mut checks = Vec::new();
     for (name, light, exact) in squares() {
         for place in places(trial.effort) {
             for computed in [true, false] {
+                let how = if computed { "computed" } else { "sampled" };
+                let what = format!("{name}, {}, {how}", place.name());
                 // Light that is computed has no noise but that of the places.
                 let samples = if computed { 4 } else { samples };
-                let seeds: Vec<u64> = (0..pictures).collect();
-                let picture = |i: u64| {
-                    let seed = (trial.seed * pictures + i) as u32;
-                    form_factor(&Square { light, place, computed, seed, samples })
-                };
-                let factors: Vec<f64> =
-                    seeds.into_par_iter().filter(|_| !trial.interrupted()).map(picture).collect();
+                checks.extend(until_sure(trial, [samples, 64 * samples], |samples| {
+                    let picture = |i: u64| {
+                        let seed = (trial.seed * pictures + i) as u32;
+                        form_factor(&Square { light, place, computed, seed, samples })
+                    };
+                    let seeds = (0..pictures).into_par_iter().filter(|_| !trial.interrupted());
+                    let factors: Vec<f64> = seeds.map(picture).collect();
+                    judge_form_factor(&what, u64::from(samples), &factors, exact)
+                }));
                 if trial.interrupted() {
                     return checks;
                 }
-                let how = if computed { "computed" } else { "sampled" };
-                let what = format!("{name}, {}, {how}", place.name());
-                checks.extend(judge_form_factor(&what, u64::from(samples), &factors, exact));
                 trial.tell("L12", what, 0.5);
             }
         }

@@ -1,7 +1,7 @@
 //! H7 to H9: light on its way from surface to surface.
 
 use super::kinds::ggx;
-use super::meter::{SIGMAS, larger, places};
+use super::meter::{SIGMAS, larger, places, until_sure};
 use super::pictures::differing;
 use crate::scene::{Alpha, Glass, Glossy, Light, Material};
 use crate::torture::stage::{Estimate, Stage, ball, cube, quad, reds, settings};
@@ -122,7 +122,7 @@ fn mirrors(trial: &Trial<'_>) -> Vec<Check> {
             checks.push(all_the_same(&format!("{k} bounces, {}", place.name()), &reds(&film), exact, 1e-6));
         }
         // From the fifth bounce on paths end by chance.
-        for (k, size, samples) in [(9, 32, [1024, 1024, 100_000]), (1000, 64, [0, 2048, 25_000])] {
+        for (k, size, samples) in [(9, 32, [768, 768, 100_000]), (1000, 64, [0, 2048, 25_000])] {
             let exact = (1.0 - r.powi(k + 1)) / (1.0 - r);
             let samples = trial.pick(samples[0], samples[1], samples[2]) as u32;
             // Long paths take long: once, and not in a hurry.
@@ -130,13 +130,14 @@ fn mirrors(trial: &Trial<'_>) -> Vec<Check> {
                 continue;
             }
             let mut stage = room(mirror(), k as u32, size, place, trial.seed);
-            let pictures = means(trial, &mut stage, samples);
+            let what = format!("{k} bounces, {}", place.name());
+            checks.extend(until_sure(trial, [samples, 16 * samples], |samples| {
+                let pictures = means(trial, &mut stage, samples);
+                on_average(&what, u64::from(samples * size * size), &pictures, exact, 0.0)
+            }));
             if trial.interrupted() {
                 return checks;
             }
-            let tried = u64::from(samples * size * size);
-            let what = format!("{k} bounces, {}", place.name());
-            checks.extend(on_average(&what, tried, &pictures, exact, 0.0));
             trial.tell("H8", place.name(), 0.5);
         }
     }
@@ -198,12 +199,15 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
         let walls = Material { emission: Vec3::ONE, ..Material::lambert(Vec3::splat(albedo)) };
         let exact = 1.0 / (1.0 - f64::from(albedo));
         let samples = trial.pick(512, 512, 100_000) as u32 * more;
-        let pictures = means(trial, &mut room(walls, 1000, 32, place, trial.seed), samples);
+        let mut room = room(walls, 1000, 32, place, trial.seed);
+        let what = format!("a shining room of albedo {albedo}, {}", place.name());
+        checks.extend(until_sure(trial, [samples, 16 * samples], |samples| {
+            let pictures = means(trial, &mut room, samples);
+            on_average(&what, u64::from(samples) * 1024, &pictures, exact, 0.0)
+        }));
         if trial.interrupted() {
             return Vec::new();
         }
-        let what = format!("a shining room of albedo {albedo}, {}", place.name());
-        checks.extend(on_average(&what, u64::from(samples) * 1024, &pictures, exact, 0.0));
     }
     trial.tell("H9", place.name(), 0.5);
     checks
@@ -215,31 +219,23 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
 fn balls_from_inside(trial: &Trial<'_>) -> Vec<Check> {
     let half = Material { double_sided: true, ..Material::lambert(Vec3::splat(0.5)) };
     let shining = Material { emission: Vec3::splat(0.5), ..half.clone() };
-    let samples = trial.pick(768, 768, 100_000) as u32;
-    let picture = |material: Material, lit: bool| {
+    let mut checks = Vec::new();
+    for (name, material, lit) in [("lit from its middle", half, true), ("that shines", shining, false)] {
+        let few = if lit { 256 } else { 768 };
+        let samples = trial.pick(few, few, 100_000) as u32;
         let mut stage = Stage::new(settings(32, 32, Integrator::Path, 1000));
         stage.add_mesh(ball(128), material, HERE);
         if lit {
             stage.add(Light::Point { intensity: Vec3::splat(std::f32::consts::PI) }, HERE);
         }
         stage.look_wide(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.5, 0.3, -0.6));
-        means(trial, &mut stage, samples)
-    };
-    let mut checks = Vec::new();
-    for (name, material, lit) in [("lit from its middle", half, true), ("that shines", shining, false)] {
-        let pixels = picture(material, lit);
-        if trial.interrupted() {
-            return checks;
-        }
         // Facets are nearer than the ball by a ten thousandth or two.
         let model = if lit { 5e-4 } else { 0.0 };
-        checks.extend(on_average(
-            &format!("inside of a ball {name}"),
-            u64::from(samples) * 1024,
-            &pixels,
-            1.0,
-            model,
-        ));
+        let what = format!("inside of a ball {name}");
+        checks.extend(until_sure(trial, [samples, 16 * samples], |samples| {
+            let pictures = means(trial, &mut stage, samples);
+            on_average(&what, u64::from(samples) * 1024, &pictures, 1.0, model)
+        }));
     }
     checks
 }
