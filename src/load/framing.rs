@@ -9,6 +9,7 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// Triangles that are looked at to find the bounds.
 const MOST_SAMPLES: usize = 100_000;
@@ -135,7 +136,7 @@ fn trimmed(samples: &mut [Sample]) -> [Box3; 2] {
     let number = samples.len() as f64;
     let mut cores = [Box3 { min: DVec3::ZERO, max: DVec3::ZERO }; 2];
     for axis in 0..3 {
-        samples.sort_unstable_by(|a, b| a.corner[axis].total_cmp(&b.corner[axis]));
+        samples.par_sort_unstable_by(|a, b| a.corner[axis].total_cmp(&b.corner[axis]));
         let edges = |weight: fn(&Sample) -> f64, outside: f64| {
             [
                 inner_edge(samples.iter(), axis, weight, outside),

@@ -3,9 +3,12 @@
 use super::report::{Kind, Sink};
 use crate::scene::{Influences, Target, TriangleMesh};
 use glam::{DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 /// Coordinates beyond this are left out: their products overflow single precision.
 const FAR: f32 = 1e18;
+/// Vertices or triangles that are worth another thread.
+pub(super) const MANY: usize = 1 << 14;
 
 /// One primitive: the attributes that are there have one entry a vertex.
 #[derive(Default)]
@@ -81,6 +84,16 @@ pub(super) fn merge(parts: Vec<Part>) -> TriangleMesh {
     let any_colors = parts.iter().any(|part| part.colors.is_some());
     let several_slots = parts.iter().any(|part| part.slot != 0);
     let mut mesh = TriangleMesh::default();
+    let mut parts = parts.into_iter();
+    if let (1, false) = (parts.len(), several_slots)
+        && let Some(part) = parts.next()
+    {
+        let Part { positions, triangles, .. } = part;
+        let [uvs, second_uvs] = [part.uvs, part.second_uvs].map(Option::unwrap_or_default);
+        let [tangents, colors] = [part.tangents, part.colors].map(Option::unwrap_or_default);
+        let normals = part.normals.unwrap_or_default();
+        return TriangleMesh { positions, triangles, normals, uvs, second_uvs, tangents, colors, ..mesh };
+    }
     for mut part in parts {
         let first = mesh.positions.len() as u32;
         let count = part.positions.len();
@@ -140,10 +153,13 @@ pub(super) fn unit_normal(corners: [Vec3; 3]) -> Option<Vec3> {
 /// Drops what cannot be traced and mends what can, so that every promise of [`TriangleMesh`] holds.
 /// With `keep_flat`, triangles without area stay.
 pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
-    let not_finite = retain(&mut mesh, |corners| corners.iter().all(|p| p.is_finite()));
+    let is_near = |p: &Vec3| p.abs().max_element() <= FAR;
+    let all_near = mesh.positions.par_iter().with_min_len(MANY).all(|p| p.is_finite() && is_near(p));
+    let not_finite =
+        if all_near { 0 } else { retain(&mut mesh, |corners| corners.iter().all(|p| p.is_finite())) };
     let mut mended = Mended { not_finite, ..Mended::default() };
     let triangles = mesh.triangles.len();
-    mended.too_far = retain(&mut mesh, |corners| corners.iter().all(|p| p.abs().max_element() <= FAR));
+    mended.too_far = if all_near { 0 } else { retain(&mut mesh, |corners| corners.iter().all(is_near)) };
     mended.without_area = if keep_flat { 0 } else { mesh.drop_degenerate() };
     mend_normals(&mut mesh, &mut mended);
     for uv in mesh.uvs.iter_mut().chain(&mut mesh.second_uvs) {
@@ -152,11 +168,11 @@ pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
             mended.uvs += 1;
         }
     }
-    for tangent in &mut mesh.tangents {
+    mesh.tangents.par_iter_mut().with_min_len(MANY).for_each(|tangent| {
         let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
         // What has no direction is made later, where a normal map needs it.
         *tangent = tangent.truncate().try_normalize().map_or(Vec4::ZERO, |t| t.extend(side));
-    }
+    });
     for color in &mut mesh.colors {
         if !color.is_finite() {
             *color = Vec4::ONE;
@@ -182,16 +198,12 @@ fn retain(mesh: &mut TriangleMesh, mut pass: impl FnMut([Vec3; 3]) -> bool) -> u
 
 /// Unit length for all; what has no direction gets the mean normal of its faces.
 fn mend_normals(mesh: &mut TriangleMesh, mended: &mut Mended) {
-    let mut broken = vec![false; mesh.normals.len()];
-    for (normal, broken) in mesh.normals.iter_mut().zip(&mut broken) {
-        match normal.as_dvec3().try_normalize() {
-            Some(unit) => *normal = unit.as_vec3(),
-            None => {
-                *broken = true;
-                *normal = Vec3::ZERO;
-            }
-        }
-    }
+    let is_broken = |normal: &mut Vec3| {
+        let unit = normal.as_dvec3().try_normalize();
+        *normal = unit.map_or(Vec3::ZERO, DVec3::as_vec3);
+        unit.is_none()
+    };
+    let broken: Vec<bool> = mesh.normals.par_iter_mut().with_min_len(MANY).map(is_broken).collect();
     mended.normals = broken.iter().filter(|&&b| b).count();
     if mended.normals == 0 {
         return;

@@ -2,6 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A mesh asset: its own entity, shared by any number of [`Instance`]s.
@@ -69,6 +70,8 @@ impl TriangleMesh {
     /// The area is judged in double precision after scaling, so that tiny triangles stay.
     pub fn drop_degenerate(&mut self) -> usize {
         let keep: Vec<bool> = (0..self.triangles.len())
+            .into_par_iter()
+            .with_min_len(1 << 14)
             .map(|i| {
                 let [a, b, c] = self.corners(i).map(Vec3::as_dvec3);
                 let normal = (b - a).cross(c - a);

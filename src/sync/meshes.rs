@@ -37,7 +37,8 @@ pub fn build_blas(
     let made: Vec<(Entity, u64, Done)> = changed
         .into_par_iter()
         .map(|(entity, mesh, old)| {
-            let triangles: Vec<[Vec3; 3]> = (0..mesh.0.triangles.len()).map(|i| mesh.0.corners(i)).collect();
+            let numbers = (0..mesh.0.triangles.len()).into_par_iter().with_min_len(1 << 14);
+            let triangles: Vec<[Vec3; 3]> = numbers.map(|i| mesh.0.corners(i)).collect();
             let key = fingerprint(&triangles);
             let known = cache.0.get(&key).and_then(Weak::upgrade);
             let done = if let Some(known) = known.filter(|known| known.is_over(&triangles)) {

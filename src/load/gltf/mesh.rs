@@ -6,7 +6,7 @@ use super::deform::{self, Follower};
 use super::material::Palette;
 use super::vertices::Used;
 use crate::load::error::LoadError;
-use crate::load::geometry::{self, Part};
+use crate::load::geometry::{self, MANY, Part};
 use crate::load::report::Sink;
 use crate::load::tangents;
 use crate::scene::{Deform, Mesh, Skin};
@@ -16,6 +16,7 @@ use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -175,7 +176,7 @@ fn read_primitive(
     let memory = 4 * positions.count as u64 + 2 * (vertices * 48 + triangles * 14) + triangles * 80;
     document.budget.take(memory, file, place)?;
     let used = Used::read(document, primitive, positions.count, mode, place, sink)?;
-    let vertices = used.vertices.iter().map(|&v| v as usize);
+    let vertices = used.vertices.par_iter().with_min_len(MANY).map(|&v| v as usize);
     let mut part = Part {
         positions: vertices.clone().map(|v| Vec3::from(positions.get_f32(v))).collect(),
         normals: normals.map(|n| vertices.clone().map(|v| Vec3::from(n.get_f32(v))).collect()),

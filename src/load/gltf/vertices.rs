@@ -3,9 +3,10 @@
 use super::Document;
 use super::mesh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
+use crate::load::geometry::MANY;
 use crate::load::report::Sink;
 use gltf::json::mesh::{Mode, Primitive};
-use std::collections::HashMap;
+use rayon::prelude::*;
 
 /// The vertices that triangles use, renumbered: several primitives often share one large array.
 pub(super) struct Used {
@@ -35,47 +36,38 @@ impl Used {
             return Err(document.broken(&indices.place, "indices must be unsigned integers"));
         }
         leftover(document, mode, indices.count, place, sink);
-        let mut numbers = Numbers::new(count, indices.count);
-        let mut vertices = Vec::new();
-        let mut renumbered = Vec::with_capacity(indices.count);
-        for i in 0..indices.count {
-            let vertex = indices.get_index(i);
-            if vertex as usize >= count {
-                return Err(document
-                    .broken(&indices.place, format!("index out of range: vertex {vertex} of {count}")));
-            }
-            renumbered.push(numbers.number(vertex, &mut vertices));
+        let mut corners: Vec<u32> =
+            (0..indices.count).into_par_iter().with_min_len(MANY).map(|i| indices.get_index(i)).collect();
+        if let Some(vertex) = corners.iter().find(|&&vertex| vertex as usize >= count) {
+            let what = format!("index out of range: vertex {vertex} of {count}");
+            return Err(document.broken(&indices.place, what));
         }
-        Ok(Self { vertices, triangles: triangles_of(mode, renumbered.len(), |i| renumbered[i]) })
+        let vertices = renumber(&mut corners, count);
+        Ok(Self { vertices, triangles: triangles_of(mode, corners.len(), |i| corners[i]) })
     }
 }
 
-/// Old vertex number → new: a table, or a map where the table would be mostly empty.
-enum Numbers {
-    Table(Vec<u32>),
-    Map(HashMap<u32, u32>),
-}
-
-impl Numbers {
-    fn new(vertices: usize, indices: usize) -> Self {
-        if vertices <= 4 * indices + 1024 {
-            Self::Table(vec![u32::MAX; vertices])
-        } else {
-            Self::Map(HashMap::new())
+/// Numbers the vertices that `corners` name anew, in their order, without those of the `count` that none names; returns the
+/// old numbers.
+fn renumber(corners: &mut [u32], count: usize) -> Vec<u32> {
+    // A table, unless it would be mostly empty.
+    if count <= 4 * corners.len() + 1024 {
+        let mut numbers = vec![u32::MAX; count];
+        corners.iter().for_each(|&vertex| numbers[vertex as usize] = 0);
+        let used: Vec<u32> = (0..count as u32).filter(|&vertex| numbers[vertex as usize] == 0).collect();
+        if used.len() < count {
+            used.iter().zip(0..).for_each(|(&vertex, number)| numbers[vertex as usize] = number);
+            corners.iter_mut().for_each(|vertex| *vertex = numbers[*vertex as usize]);
         }
+        return used;
     }
-
-    fn number(&mut self, vertex: u32, vertices: &mut Vec<u32>) -> u32 {
-        let known = match self {
-            Self::Table(table) => &mut table[vertex as usize],
-            Self::Map(map) => map.entry(vertex).or_insert(u32::MAX),
-        };
-        if *known == u32::MAX {
-            *known = vertices.len() as u32;
-            vertices.push(vertex);
-        }
-        *known
+    let mut used = corners.to_vec();
+    used.sort_unstable();
+    used.dedup();
+    for vertex in corners {
+        *vertex = used.partition_point(|known| known < vertex) as u32;
     }
+    used
 }
 
 fn leftover(document: &Document<'_>, mode: Mode, count: usize, place: &str, sink: &mut Sink<'_>) {
@@ -93,5 +85,23 @@ fn triangles_of(mode: Mode, count: usize, vertex: impl Fn(usize) -> u32) -> Vec<
         Mode::TriangleStrip => (0..strip).map(|i| corners([i, i + 1 + i % 2, i + 2 - i % 2])).collect(),
         Mode::TriangleFan => (0..strip).map(|i| corners([i + 1, i + 2, 0])).collect(),
         _ => (0..count / 3).map(|i| corners([3 * i, 3 * i + 1, 3 * i + 2])).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_keep_their_order_and_what_nobody_uses_goes() {
+        let named = [7, 2, 7, 5, 2, 0];
+        for count in [8, 100_000] {
+            let mut corners = named;
+            let used = renumber(&mut corners, count);
+            assert_eq!(used, [0, 2, 5, 7]);
+            assert_eq!(corners.map(|corner| used[corner as usize]), named);
+        }
+        let mut all = [2, 0, 1];
+        assert_eq!((renumber(&mut all, 3), all), (vec![0, 1, 2], [2, 0, 1]));
     }
 }
