@@ -3,7 +3,8 @@
 //! Alone is what no program that shows all of a file can leave out: for glTF reading the file and decoding its images with
 //! `image` on all threads, for OBJ reading it with `tobj`. Ours ends with a picture of 960×540, hierarchy and all.
 
-mod shapes;
+#[path = "shapes/terrain.rs"]
+mod terrain;
 
 use glam::{UVec2, Vec3};
 use image::codecs::jpeg::JpegEncoder;
@@ -27,7 +28,7 @@ struct Hills {
 }
 
 fn hills(side: usize) -> Hills {
-    let corners = shapes::terrain(side);
+    let corners = terrain::terrain(side);
     let row = side as u32 + 1;
     let mut positions = vec![Vec3::ZERO; (row * row) as usize];
     let mut triangles = Vec::with_capacity(corners.len());
@@ -148,8 +149,10 @@ fn alone(path: &Path, images: &[Vec<u8>]) -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     std::hint::black_box(std::fs::read(path)?);
-    let decoded: Result<Vec<_>, _> =
-        images.par_iter().map(|jpeg| image::load_from_memory(jpeg).map(|image| image.into_rgba8())).collect();
+    let decoded: Result<Vec<_>, _> = images
+        .par_iter()
+        .map(|jpeg| image::load_from_memory(jpeg).map(image::DynamicImage::into_rgba8))
+        .collect();
     std::hint::black_box(decoded?);
     Ok(())
 }

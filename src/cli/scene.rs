@@ -102,8 +102,8 @@ pub struct PartArgs {
     /// Pose at this time of the animations, instead of the rest pose
     #[arg(long, value_name = "SECONDS", value_parser = time)]
     pub time: Option<f64>,
-    /// Animation to take the pose from, by name or by number from 0 [default: the first, and those of other things]
-    #[arg(long, value_name = "NAME|INDEX", requires = "time")]
+    /// Animation to play or to take the pose from, by name or by number from 0 [default: the first, and those of other things]
+    #[arg(long, value_name = "NAME|INDEX")]
     pub animation: Option<String>,
     /// Memory that loading may take, such as 2G or 500M [default: three quarters of what is free]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]

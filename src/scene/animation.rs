@@ -78,13 +78,14 @@ pub struct Pose {
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct MorphWeights(pub Vec<f32>);
 
-/// What is played and where it is. Without this resource everything stands as the file has it.
-#[derive(Resource, Clone, Debug, PartialEq)]
+/// What is played and where it is.
+#[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct Playing {
     /// Entities with an [`Animation`]; later ones win where they move the same thing.
     pub animations: Vec<Entity>,
-    /// Seconds since the start. Each animation begins anew after its own duration.
-    pub time: f64,
+    /// Seconds since the start. Each animation begins anew after its own duration. `None`: everything stands as the file
+    /// has it.
+    pub time: Option<f64>,
 }
 
 /// Puts everything that is animated where it is at the time of [`Playing`].
@@ -94,9 +95,10 @@ pub fn play(
     mut poses: Query<(&mut Pose, &mut Transform)>,
     mut weights: Query<&mut MorphWeights>,
 ) {
+    let Some(time) = playing.time else { return };
     let mut value = Vec::new();
     for animation in playing.animations.iter().filter_map(|&entity| animations.get(entity).ok()) {
-        let time = animation.local_time(playing.time);
+        let time = animation.local_time(time);
         for Channel { target, property, curve } in &animation.channels {
             curve.sample(time, *property == Property::Rotation, &mut value);
             if *property == Property::Weights {

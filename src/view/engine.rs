@@ -7,6 +7,7 @@ use super::input::{Command, Input};
 use super::instrument::{Instrument, Reference};
 use super::keymap::Tap;
 use super::plain::Plain;
+use super::playing::Clock;
 use super::prepare::{prepare, status};
 use super::reload::{is_sky, load_again, open_other, set_sky};
 use super::status::Status;
@@ -180,7 +181,9 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             let now = Instant::now();
             let mut input = app.world.resource_mut::<Input>();
             input.hold_until(now);
-            let moving = input.is_moving() || input.has_motion();
+            let plays = app.world.resource::<Clock>().runs();
+            let input = app.world.resource::<Input>();
+            let moving = plays || input.is_moving() || input.has_motion();
             let paused = app.world.resource::<Paused>().0;
             app.world.resource_mut::<FrameBudget>().time = Some(match (paused, moving) {
                 (true, _) => Duration::ZERO,
@@ -201,7 +204,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             if moving {
                 view_changed_at = Instant::now();
             }
-            let held = app.world.resource::<Input>().is_moving();
+            let held = app.world.resource::<Input>().is_moving() || app.world.resource::<Clock>().runs();
             // A frame that was cut off has shown nothing, and what cut it off may have been read before.
             let cut_off = self.interrupt.load(Ordering::SeqCst);
             idle = !held

@@ -22,6 +22,7 @@ pub mod keys_file;
 pub mod orbit;
 pub mod pixel_view;
 pub mod plain;
+pub mod playing;
 mod pointer;
 mod prepare;
 mod present;

@@ -19,12 +19,13 @@ use super::pixel_view::{
     refine_first_hits,
 };
 use super::plain::{Plain, develop_plain};
+use super::playing::{Clock, advance};
 use super::recipe::recipe;
 use super::status::{Machine, Status};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
 use crate::image::Display;
 use crate::open::LoadCard;
-use crate::scene::{ActiveCamera, SceneBounds, propagate_transforms};
+use crate::scene::{ActiveCamera, Playing, SceneBounds, propagate_transforms};
 use crate::shown::Shown;
 use crate::sync::{Redone, build_blas, reset_film};
 use crate::trace::film::Pixel;
@@ -58,6 +59,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
         app.world.insert_resource(Input::new(Instant::now()));
     }
     app.world.init_resource::<Paused>();
+    app.world.init_resource::<Clock>();
     app.world.init_resource::<Notices>();
     app.world.init_resource::<Plain>();
     app.world.init_resource::<Held>();
@@ -87,7 +89,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             (change_shown, develop_plain).chain(),
             save_picture,
             change_display,
-            change_pause,
+            (change_pause, advance).chain(),
             (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
             (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
             (remember, print_camera, choose_pixel_view, change_debug, edit_scene).chain(),
@@ -117,6 +119,7 @@ pub fn status(app: &App) -> Status {
         sample_target: world.resource::<FrameBudget>().sample_target,
         done: stats.done,
         paused: world.resource::<Paused>().0,
+        animation: world.get_resource::<Playing>().and_then(|playing| playing.time),
         noise: stats.noise.map(|noise| (noise, stats.noise_doubt)),
         graph: Arc::clone(&world.resource::<Instrument>().graph),
         legend: world.resource::<CurrentLegend>().0.clone(),

@@ -9,7 +9,7 @@ use crate::image::Display;
 use crate::image::recipe::Recipe;
 use crate::load::SceneSource;
 use crate::open::SceneOrigin;
-use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Playing};
 use crate::trace::{RenderSettings, Sampling};
 use bevy_ecs::prelude::*;
 
@@ -48,6 +48,21 @@ pub fn recipe(world: &World) -> Recipe {
     }
     if let Some(path) = &origin.options.sky {
         add("--hdri", std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string());
+    }
+    let options = &origin.options;
+    let part = [
+        ("--gltf-scene", &options.scene),
+        ("--variant", &options.variant),
+        ("--animation", &options.animation),
+    ];
+    for (flag, value) in part {
+        if let Some(value) = value {
+            add(flag, value.clone());
+        }
+    }
+    let playing = world.get_resource::<Playing>().and_then(|playing| playing.time);
+    if let Some(time) = playing.or(options.time) {
+        add("--time", time.to_string());
     }
     if let Some(edits) = unsaved(world, origin) {
         add("--edits", edits);

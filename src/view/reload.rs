@@ -9,12 +9,13 @@ use super::input::Input;
 use super::instrument::Instrument;
 use super::orbit::Navigation;
 use super::pixel_view::PixelView;
+use super::playing::Clock;
 use crate::app::{App, FrameBudget};
 use crate::image::Display;
 use crate::load::settings::edit::change;
 use crate::load::{LoadOptions, SceneSource, Watcher};
 use crate::open::{SceneOrigin, Wishes, open};
-use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Transform};
+use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Playing, Transform};
 use crate::shown::Shown;
 use crate::sync::BlasCache;
 use crate::trace::{Film, RenderSettings};
@@ -71,7 +72,8 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     let origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
     let settings = *app.world.resource::<RenderSettings>();
     let wishes = Wishes { size: Some(settings.size), exposure: Some(0.0), ..Wishes::default() };
-    let options = LoadOptions { watcher, ..origin.options.clone() };
+    let time = app.world.get_resource::<Playing>().and_then(|playing| playing.time);
+    let options = LoadOptions { watcher, time: time.or(origin.options.time), ..origin.options.clone() };
     let mut again = open(&origin.source, &options, &wishes).map_err(|error| error.to_string())?.app;
     again.world.insert_resource(settings);
     again.world.insert_resource(Film::new(settings.size, app.world.resource::<Film>().first_sample()));
@@ -88,6 +90,7 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     keep::<Navigation>(app, &mut again);
     keep::<FlySpeed>(app, &mut again);
     keep::<Paused>(app, &mut again);
+    keep::<Clock>(app, &mut again);
     keep::<PixelView>(app, &mut again);
     if let Some(editor) = app.world.get_resource::<Editor>() {
         for table in tables(&app.world, editor) {

@@ -23,6 +23,8 @@ pub struct Status {
     pub done: bool,
     /// Whether the user has paused refinement.
     pub paused: bool,
+    /// Seconds at which the animations are, if not at rest.
+    pub animation: Option<f64>,
     /// Estimated relative noise of the picture, and half its interval.
     pub noise: Option<(f64, f64)>,
     /// How it falls.
@@ -193,7 +195,7 @@ pub fn details(status: &Status, measured: Measured) -> Vec<Cell> {
             format!("{} ms, 99 %: {} ms", significant(median * 1e3, 2), significant(worst * 1e3, 2))
         },
     );
-    vec![
+    let mut cells = vec![
         plain("picture", format!("{} × {}", status.size.x, status.size.y)),
         plain("light", integrator_name(status.integrator).to_owned()),
         plain("exposure", format!("{:+.2} EV, {}", status.exposure, tone_map_name(status.tone_map))),
@@ -203,7 +205,9 @@ pub fn details(status: &Status, measured: Measured) -> Vec<Cell> {
         plain("pictures", format!("{} / s", significant(measured.pictures_per_second, 3))),
         plain("response", latency),
         plain("restarts", status.resets.to_string()),
-    ]
+    ];
+    cells.extend(status.animation.map(|seconds| plain("animation", format!("{seconds:.2} s"))));
+    cells
 }
 
 /// What the machine holds and does.
@@ -273,6 +277,7 @@ pub(super) mod tests {
             sample_target: 64,
             done: false,
             paused: false,
+            animation: None,
             noise: None,
             graph: Arc::default(),
             legend: None,

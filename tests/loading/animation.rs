@@ -84,13 +84,30 @@ fn an_animation_is_chosen_by_name_or_number() {
 }
 
 #[test]
+fn all_files_of_a_scene_play() {
+    let scene = "[[model]]\nfile = 'a.gltf'\n[[model]]\nfile = 'b.gltf'\n";
+    let other = moving().replace("\"one\"", "\"three\"");
+    let folder = Folder::new(&[
+        ("s.toml", scene.as_bytes()),
+        ("a.gltf", moving().as_bytes()),
+        ("b.gltf", other.as_bytes()),
+    ]);
+    let (mut world, report) = folder.load_with("s.toml", &at(1.0));
+    report.unwrap();
+    for name in ["one", "three"] {
+        assert_eq!(place(&mut world, name).translation, DVec3::X * 2.0, "{name}");
+    }
+    assert_eq!(world.resource::<Playing>().animations.len(), 4);
+}
+
+#[test]
 fn a_frame_follows_the_clock() {
     let mut app = App::new(RenderSettings::default());
     let folder = Folder::new(&[("a.gltf", moving().as_bytes())]);
     let source = SceneSource::File(folder.0.join("a.gltf"));
     load(&mut app.world, &source, &at(0.0)).unwrap();
     app.build();
-    app.world.resource_mut::<Playing>().time = 1.0;
+    app.world.resource_mut::<Playing>().time = Some(1.0);
     app.build();
     assert_eq!(place(&mut app.world, "one").translation, DVec3::X * 2.0);
 }

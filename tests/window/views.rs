@@ -1,6 +1,6 @@
 //! Views of pixels, cards, and what explains the picture.
 
-use super::desktop::{SMALL, colors, desktop, difference, green_and_red, pause, wait_for};
+use super::desktop::{SMALL, colors, desktop, difference, green_and_red, pause, pictures_in, wait_for};
 
 #[test]
 fn views_of_pixels_and_cards_show_at_one_press_also_when_the_picture_rests() {
@@ -110,4 +110,65 @@ fn old_samples_and_smoothing_are_told_and_switched_off_and_the_report_opens() {
 /// Pixels of the colour in which cautions are written.
 fn red_letters(picture: &image::RgbImage) -> usize {
     picture.pixels().filter(|p| p[0] > 200 && p[1] < 150 && p[2] < 130).count()
+}
+
+/// A white triangle that moves to the right, over and over.
+fn moving_triangle(directory: &std::path::Path) {
+    let floats = [
+        [-0.5f32, -0.5, 0.0, 0.5, -0.5, 0.0, 0.0, 0.5, 0.0].as_slice(),
+        &[0.0, 2.0],
+        &[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+    ];
+    let binary: Vec<u8> = floats.concat().iter().flat_map(|x| x.to_le_bytes()).collect();
+    std::fs::write(directory.join("a.bin"), &binary).unwrap();
+    let gltf = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"uri":"a.bin","byteLength":68}],
+        "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},
+        {"buffer":0,"byteOffset":44,"byteLength":24}],"accessors":[
+        {"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[-1,-1,0],"max":[1,1,0]},
+        {"bufferView":1,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[2]},
+        {"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"}],
+        "animations":[{"samplers":[{"input":1,"output":2}],
+        "channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}]}"#;
+    std::fs::write(directory.join("a.gltf"), gltf).unwrap();
+    let scene = "[[model]]\nfile = 'a.gltf'\n[[light]]\nkind = 'environment'\nradiance = [1, 1, 1]\n\
+                 [camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\n";
+    std::fs::write(directory.join("scene.toml"), scene).unwrap();
+}
+
+#[test]
+fn animations_play_stop_and_step_and_a_screenshot_knows_the_time() {
+    let Some(desktop) = desktop("animation") else {
+        return;
+    };
+    moving_triangle(&desktop.directory);
+    let mut program = desktop.start(&["scene.toml", "--resolution", "320x240", "--spp", "4"]);
+    desktop.hide_status(&mut program);
+    let rest = desktop.shot(&program);
+    desktop.xdotool(["key", "ctrl+space"]);
+    let moved = wait_for("the triangle moves", || {
+        let shot = desktop.shot(&program);
+        (difference(&rest, &shot) > 0.05).then_some(shot)
+    });
+    wait_for("it goes on", || (difference(&moved, &desktop.shot(&program)) > 0.01).then_some(()));
+    desktop.xdotool(["key", "ctrl+space"]);
+    // The notice stays for a while at the bottom.
+    pause(7000);
+    let stopped = desktop.shot(&program);
+    pause(500);
+    assert_eq!(difference(&stopped, &desktop.shot(&program)), 0.0, "it stands still");
+    for _ in 0..6 {
+        desktop.xdotool(["key", "ctrl+period"]);
+    }
+    pause(7500);
+    let stepped = desktop.shot(&program);
+    assert!(difference(&stopped, &stepped) > 0.01, "a quarter of a second later");
+    desktop.xdotool(["key", "ctrl+F12"]);
+    let shot = wait_for("a screenshot", || pictures_in(&desktop.directory).pop());
+    pause(500);
+    let mut again = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
+    let again = again.args(["render", "--from"]).arg(&shot).args(["-q", "-o", "again.png"]);
+    assert!(again.status().unwrap().success());
+    let [a, b] = [shot, desktop.directory.join("again.png")].map(|path| image::open(path).unwrap().to_rgb8());
+    assert!(difference(&a, &b) < 0.002, "{}", difference(&a, &b));
 }

@@ -47,6 +47,7 @@ pub(super) fn spawn_all(
     entities: &[Option<Entity>],
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
+    let time = sink.options.time;
     let mut spawned = Vec::new();
     let mut moved: HashSet<(Entity, Property)> = HashSet::new();
     let mut together = Vec::new();
@@ -62,11 +63,11 @@ pub(super) fn spawn_all(
             together.push(entity);
         }
     }
-    if let Some(time) = sink.options.time {
-        let animations = match &sink.options.animation {
-            Some(wanted) => vec![document.chosen(wanted, "animation", &spawned)?],
-            None => together,
-        };
+    let animations = match &sink.options.animation {
+        Some(wanted) => vec![document.chosen(wanted, "animation", &spawned)?],
+        None => together,
+    };
+    if let Some(time) = time {
         let names: Vec<&str> = spawned
             .iter()
             .filter(|(_, entity)| animations.contains(entity))
@@ -74,10 +75,16 @@ pub(super) fn spawn_all(
             .collect();
         let which = if names.is_empty() { "no animation".to_owned() } else { names.join(", ") };
         sink.decide(document.file, format!("stands as at {time} s of {which}"));
-        sink.world.insert_resource(Playing { animations, time });
     } else if !spawned.is_empty() {
-        sink.decide(document.file, "has animations; stands in its rest pose (--time S shows another)");
+        sink.decide(
+            document.file,
+            "has animations; stands in its rest pose (--time S shows another, Ctrl+Space plays)",
+        );
     }
+    // Another file of the scene may have brought some before.
+    let mut playing = sink.world.get_resource_or_init::<Playing>();
+    playing.time = time;
+    playing.animations.extend(animations);
     sink.report.animations.extend(spawned);
     Ok(())
 }

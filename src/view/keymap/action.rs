@@ -85,6 +85,12 @@ pub enum Tap {
     PrintCamera,
     /// Stop refining, or go on.
     Pause,
+    /// Play the animations, or stop.
+    Play,
+    /// The animations' picture before.
+    StepBack,
+    /// The animations' next picture.
+    StepOn,
     /// Throw away all samples.
     Restart,
     /// Exposure down.

@@ -108,6 +108,14 @@ pub const TABLE: &[Section] = &[
         "Picture",
         &[
             row("pause / resume", &[tap("pause", Tap::Pause, &["Space"])]),
+            row("play the animations, or stop *", &[tap("play", Tap::Play, &["Ctrl+Space"])]),
+            row(
+                "their picture before, after *",
+                &[
+                    again("step_back", Tap::StepBack, &["Ctrl+Comma"]),
+                    again("step_on", Tap::StepOn, &["Ctrl+Period"]),
+                ],
+            ),
             row("start again *", &[tap("restart", Tap::Restart, &["R"])]),
             row(
                 "exposure -, + 1/3 EV (Shift: 1 EV)",
