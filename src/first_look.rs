@@ -17,8 +17,8 @@ const PROBE_SAMPLES: u32 = 4;
 const DARK: f32 = 0.01;
 /// ... and a scene if this share of its surfaces is.
 const MOSTLY: f32 = 0.7;
-/// Share of the seen surfaces that may be dark because their pixels are at an edge.
-const OUTLINE: f32 = 0.1;
+/// Share of the seen surfaces that may be dark though no lit one is beside them.
+const SPECKS: f32 = 0.01;
 
 /// Lights the scene if nothing but its emissive surfaces shines and these hardly reach any other, and chooses
 /// the exposure if nobody has. Each decision goes into the report.
@@ -53,26 +53,32 @@ pub(crate) fn settle(app: &mut App, report: &mut LoadReport, file: &str, choose_
 fn is_mostly_dark(app: &App, picture: &Film) -> bool {
     let scene = sync::traceable(&app.world);
     let size = picture.size();
-    let mut seen: Vec<(f32, bool)> = Vec::new();
+    let width = size.x as usize;
+    let mut seen: Vec<Option<(f32, bool)>> = Vec::new();
     for y in 0..size.y {
         for (x, pixel) in (0..size.x).zip(picture.row(y)) {
             let ray = scene.viewpoint.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size);
-            if let Some(hit) = scene.geometry.tlas.closest_hit(&ray) {
+            seen.push(scene.geometry.tlas.closest_hit(&ray).map(|hit| {
                 let shines = scene.surface_at(&hit).1.material.emission != Vec3::ZERO;
-                seen.push((luminance(pixel.mean().as_vec3()), shines));
-            }
+                (luminance(pixel.mean().as_vec3()), shines)
+            }));
         }
     }
-    let mut lit: Vec<f32> = seen.iter().map(|&(l, _)| l).filter(|&l| l > 0.0).collect();
+    let surfaces = || seen.iter().flatten();
+    let mut lit: Vec<f32> = surfaces().map(|&(l, _)| l).filter(|&l| l > 0.0).collect();
     if lit.is_empty() {
-        return !seen.is_empty();
+        return surfaces().next().is_some();
     }
     // Not the very brightest: a lamp in the picture outshines all that it lights.
     let rank = (lit.len() - 1) * 9 / 10;
     let least = DARK * *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
     // Where the texture of an emissive surface is black it is a surface like others.
-    let others = seen.iter().filter(|&&(l, shines)| !shines || l <= least);
-    let dark = others.clone().filter(|&&(l, _)| l <= least).count() as f32;
+    let others = surfaces().filter(|&&(l, shines)| !shines || l <= least).count() as f32;
+    let is_dark = |i: usize| seen.get(i).copied().flatten().is_some_and(|(l, _)| l <= least);
+    let dark = (0..seen.len()).filter(|&i| is_dark(i)).count() as f32;
     // The outline of a glowing thing alone is no scene that wants light.
-    dark > OUTLINE * seen.len() as f32 && dark > MOSTLY * others.count() as f32
+    let within =
+        |&i: &usize| [i, i + 1, i.wrapping_sub(1), i + width, i.wrapping_sub(width)].into_iter().all(is_dark);
+    let inner = (0..seen.len()).filter(within).count() as f32;
+    inner > SPECKS * surfaces().count() as f32 && dark > MOSTLY * others
 }

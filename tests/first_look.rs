@@ -64,3 +64,12 @@ fn a_glowing_thing_alone_stays_alone() {
     let mut scene = opened("alone", "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl lamp\nf 1 2 3\n", MTL);
     assert_eq!(lights(&mut scene), 0, "{:?}", scene.report.decisions());
 }
+
+#[test]
+fn a_dark_island_in_a_glowing_sea_gets_light() {
+    let sea = "v -4 0 4\nv 4 0 4\nv 4 0 -4\nv -4 0 -4\nusemtl lamp\nf 1 2 3 4\n";
+    let island = "v -1 .1 1\nv 1 .1 1\nv 1 .1 -1\nv -1 .1 -1\nusemtl floor\nf 5 6 7 8\n";
+    let mut scene = opened("island", &format!("{sea}{island}"), MTL);
+    assert_eq!(lights(&mut scene), 2, "{:?}", scene.report.decisions());
+    assert!(says(&scene.report, "light hardly anything"));
+}
