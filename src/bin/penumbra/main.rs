@@ -16,6 +16,10 @@ use penumbra::cli::{Cli, Command};
 use penumbra::load::built_in_scenes;
 use std::process::ExitCode;
 
+/// Pictures come in changing sizes for hours: glibc's allocator keeps most of what was freed between them.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let code = match cli.command {
