@@ -17,7 +17,9 @@ const PROBE_SAMPLES: u32 = 4;
 const DARK: f32 = 0.01;
 /// ... and a scene if this share of its surfaces is.
 const MOSTLY: f32 = 0.7;
-/// Share of the seen surfaces that may be dark though no lit one is beside them.
+/// Share of the seen surfaces that may be dark because their pixels are at an edge, or black parts of what shines; ...
+const OUTLINE: f32 = 0.1;
+/// ... and that may be dark though they neither shine nor are beside a lit one.
 const SPECKS: f32 = 0.01;
 
 /// Lights the scene if nothing but its emissive surfaces shines and these hardly reach any other, and chooses
@@ -77,8 +79,11 @@ fn is_mostly_dark(app: &App, picture: &Film) -> bool {
     let is_dark = |i: usize| seen.get(i).copied().flatten().is_some_and(|(l, _)| l <= least);
     let dark = (0..seen.len()).filter(|&i| is_dark(i)).count() as f32;
     // The outline of a glowing thing alone is no scene that wants light.
-    let within =
-        |&i: &usize| [i, i + 1, i.wrapping_sub(1), i + width, i.wrapping_sub(width)].into_iter().all(is_dark);
-    let inner = (0..seen.len()).filter(within).count() as f32;
-    inner > SPECKS * surfaces().count() as f32 && dark > MOSTLY * others
+    let within = |&i: &usize| {
+        let is_plain = seen[i].is_some_and(|(_, shines)| !shines);
+        let inside = i >= width && (1..width - 1).contains(&(i % width));
+        is_plain && inside && [i, i + 1, i - 1, i + width, i - width].into_iter().all(is_dark)
+    };
+    let (inner, all) = ((0..seen.len()).filter(within).count() as f32, surfaces().count() as f32);
+    (inner > SPECKS * all || dark > OUTLINE * all) && dark > MOSTLY * others
 }

@@ -4,9 +4,9 @@
 #[path = "support/stage.rs"]
 mod stage;
 
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 use penumbra::bvh::{Isa, Ray};
-use penumbra::scene::{Light, Material};
+use penumbra::scene::{Glossy, Light, Material, Visible};
 use penumbra::trace::block::{Block, LANES, Placed};
 use penumbra::trace::sampler::{Sampler, SamplerRow};
 use penumbra::trace::surface::Interaction;
@@ -138,6 +138,54 @@ fn however_often_the_eye_looks_it_is_the_same_light() {
                 sigma / one.mean
             );
             assert!(off.abs() < 4.5 && sigma < 2e-3 * one.mean, "{integrator:?}: {one:?} {more:?}");
+        }
+    }
+}
+
+/// A floor, even or with a coat, under a lamp that only shines: no bounce runs into it.
+fn under_an_unseen_lamp(
+    light: Light,
+    glossy: Glossy,
+    integrator: Integrator,
+    light_samples: u32,
+) -> Estimate {
+    let mut stage = Stage::new(RenderSettings { light_samples, ..settings(16, 16, integrator, 1) });
+    let floor = Material { glossy, double_sided: true, ..Material::lambert(Vec3::splat(0.5)) };
+    let corner = Vec3::new(-2.0, -2.0, 0.0);
+    stage.add_mesh(quad(corner, Vec3::X * 4.0, Vec3::Y * 4.0), floor, DAffine3::IDENTITY);
+    let turned = DAffine3::from_rotation_translation(DQuat::from_rotation_x(std::f64::consts::PI), DVec3::Z);
+    let lamp = stage.add(light, turned);
+    stage.app.world.entity_mut(lamp).insert(Visible(false));
+    stage.look(DVec3::new(0.0, -1.5, 0.9), DVec3::ZERO, DVec3::Z, 0.5);
+    Estimate::of(&reds(&stage.expose(256, || true).0))
+}
+
+#[test]
+fn a_lamp_that_only_shines_loses_no_light_to_bounces_that_never_meet_it() {
+    let radiance = Vec3::splat(2.0);
+    let quad = Light::Parallelogram {
+        edge_u: Vec3::X * 3.0,
+        edge_v: Vec3::Y * 3.0,
+        radiance: [radiance; 4],
+        two_sided: true,
+    };
+    let disk = Light::Disk { radius: 1.5, radiance, two_sided: true };
+    let ball = Light::Sphere { radius: 0.7, radiance };
+    let coat = Glossy::BlinnPhong { specular: Vec3::splat(0.5), exponent: 30.0, texture: None };
+    let none = Material::default().glossy;
+    for (name, light) in [("parallelogram", quad), ("disk", disk), ("ball", ball)] {
+        // All light there is comes straight from the lamp: both integrators see the same.
+        for (glossy, what) in [(none.clone(), "even"), (coat.clone(), "coated")] {
+            let seen =
+                |integrator, looks| under_an_unseen_lamp(light.clone(), glossy.clone(), integrator, looks);
+            let first = seen(Integrator::Direct, 1);
+            for (integrator, looks) in [(Integrator::Direct, 3), (Integrator::Path, 1), (Integrator::Path, 2)]
+            {
+                let other = seen(integrator, looks);
+                let off = (other.mean / first.mean - 1.0).abs();
+                println!("{name}, {what}, {} {looks}: {} {}", integrator.name(), first.mean, other.mean);
+                assert!(off < 1.5e-3, "{name}, {what}: {} is not {} ({off:.1e})", other.mean, first.mean);
+            }
         }
     }
 }

@@ -73,3 +73,16 @@ fn a_dark_island_in_a_glowing_sea_gets_light() {
     assert_eq!(lights(&mut scene), 2, "{:?}", scene.report.decisions());
     assert!(says(&scene.report, "light hardly anything"));
 }
+
+#[test]
+fn a_screen_with_a_black_patch_is_no_dark_scene() {
+    let picture = |x: u32, y: u32| if x < 3 && y < 3 { [0, 0, 0] } else { [255; 3] };
+    let texture = image::RgbImage::from_fn(10, 10, |x, y| image::Rgb(picture(x, y)));
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("first_look");
+    std::fs::create_dir_all(&folder).unwrap();
+    texture.save(folder.join("patch.png")).unwrap();
+    let screen = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl screen\nf 1/1 2/2 3/3 4/4\n";
+    let mtl = "newmtl screen\nKd 0 0 0\nKe 1 1 1\nmap_Ke patch.png\n";
+    let mut scene = opened("screen", screen, mtl);
+    assert_eq!(lights(&mut scene), 0, "{:?}", scene.report.decisions());
+}

@@ -94,16 +94,16 @@ pub struct SceneArgs {
 #[derive(Debug, Args)]
 pub struct PartArgs {
     /// Scene of a glTF file, by name or by number from 0 [default: the file's]
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", allow_hyphen_values = true)]
     pub gltf_scene: Option<String>,
     /// Material variant of a glTF file, by name or by number from 0
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", allow_hyphen_values = true)]
     pub variant: Option<String>,
     /// Pose at this time of the animations, instead of the rest pose
     #[arg(long, value_name = "SECONDS", value_parser = time)]
     pub time: Option<f64>,
     /// Animation to play or to take the pose from, by name or by number from 0 [default: the first, and those of other things]
-    #[arg(long, value_name = "NAME|INDEX")]
+    #[arg(long, value_name = "NAME|INDEX", allow_hyphen_values = true)]
     pub animation: Option<String>,
     /// Memory that loading may take, such as 2G or 500M [default: three quarters of what is free]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]

@@ -176,6 +176,9 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         sink.spawn((Name::new("sky"), Transform::default(), light));
         sink.decide(&file, format!("its sky is {}", path.display()));
     }
+    check_animation(&file, sink)?;
+    // Before the edits: what is moved by hand stands where it was put.
+    set_in_motion(sink.world);
     for settings in &settings {
         settings.apply_edits(sink)?;
     }
@@ -205,12 +208,30 @@ fn make(made: &Made, sink: &mut Sink<'_>) {
     framing::complete(made.name, active, sink);
 }
 
-/// Brings meshes into the shape that their weights and joints, animated or not, ask for.
-fn pose(world: &mut World) {
-    // None of these systems has a parameter that could be missing.
+/// Whether one of the files has the animation that was asked for.
+fn check_animation(file: &str, sink: &Sink<'_>) -> Result<(), LoadError> {
+    let Some(wanted) = &sink.options.animation else { return Ok(()) };
+    if sink.world.get_resource::<Playing>().is_some_and(|playing| !playing.animations.is_empty()) {
+        return Ok(());
+    }
+    let all = sink.report.animations.iter().enumerate();
+    let names: Vec<String> = all.map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
+    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    Err(LoadError::NotThere { file: file.to_owned(), kind: "animation", wanted: wanted.clone(), names })
+}
+
+/// Puts what is animated where it is at the time that is wanted.
+fn set_in_motion(world: &mut World) {
     if world.contains_resource::<Playing>() {
+        // It has no parameter that could be missing.
         let _ = world.run_system_once(play);
     }
+}
+
+/// Brings meshes into the shape that their weights and joints, animated or not, ask for.
+fn pose(world: &mut World) {
+    set_in_motion(world);
+    // None of these systems has a parameter that could be missing.
     let _ = world.run_system_once(propagate_transforms);
     let _ = world.run_system_once(deform);
 }

@@ -1,6 +1,9 @@
 //! A camera as command line flags.
 
-use crate::scene::{Camera, GlobalTransform, Lens, Projection};
+use crate::load::LoadOptions;
+use crate::open::SceneOrigin;
+use crate::scene::{Camera, GlobalTransform, Lens, Playing, Projection};
+use bevy_ecs::prelude::*;
 use glam::DVec3;
 
 /// The command line flags that look through `camera` at `pose`.
@@ -29,6 +32,18 @@ pub fn camera_flags(camera: Camera, pose: GlobalTransform, lens: Option<Lens>) -
         flags += &format!(" --lens-radius {radius} --focus-distance {focus}");
     }
     flags
+}
+
+/// The flags that choose the scene, variant, animation and time of a file, each with its value.
+#[must_use]
+pub fn part_flags(world: &World) -> Vec<(&'static str, String)> {
+    let Some(origin) = world.get_resource::<SceneOrigin>() else { return Vec::new() };
+    let LoadOptions { scene, variant, animation, time, .. } = &origin.options;
+    let playing = world.get_resource::<Playing>().and_then(|playing| playing.time);
+    let time = playing.or(*time).map(|time| time.to_string());
+    let flags =
+        [("--gltf-scene", scene), ("--variant", variant), ("--animation", animation), ("--time", &time)];
+    flags.into_iter().filter_map(|(flag, value)| Some((flag, value.clone()?))).collect()
 }
 
 /// Exact: the shortest text that gives the same numbers again.

@@ -17,6 +17,12 @@ pub struct Clock {
 }
 
 impl Clock {
+    /// As this one, without the time that has passed: another world shows what this one did.
+    #[must_use]
+    pub fn restarted(self) -> Self {
+        Self { since: self.since.map(|_| Instant::now()) }
+    }
+
     /// Whether they run.
     #[must_use]
     pub fn runs(self) -> bool {
@@ -47,6 +53,8 @@ fn advance_until(
         if asked {
             notices.0.push(Notice::Text("nothing in this scene is animated".to_owned()));
         }
+        // Those that ran may be gone with another version of the file.
+        clock.since = None;
         return;
     };
     let [plays, back, on] = taps;
@@ -124,6 +132,10 @@ mod tests {
     fn a_scene_in_which_nothing_moves_says_so() {
         let (mut stage, mut clock) = (Stage::new(0), Clock::default());
         assert_eq!(stage.after(0, &[Tap::Play], &mut clock), (None, 1));
+        assert!(!clock.runs());
+        // Nor does a clock go on that ran before the file was changed.
+        let mut clock = Clock { since: Some(stage.1) };
+        assert_eq!(stage.after(40, &[], &mut clock), (None, 0));
         assert!(!clock.runs());
     }
 }

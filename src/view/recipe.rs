@@ -2,14 +2,14 @@
 
 use super::edit::Editor;
 use super::edit::save::edits;
-use super::flags::camera_flags;
+use super::flags::{camera_flags, part_flags};
 use super::status::percent;
 use crate::app::FrameStats;
 use crate::image::Display;
 use crate::image::recipe::Recipe;
 use crate::load::SceneSource;
 use crate::open::SceneOrigin;
-use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Playing};
+use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
 use crate::trace::{RenderSettings, Sampling};
 use bevy_ecs::prelude::*;
 
@@ -49,20 +49,8 @@ pub fn recipe(world: &World) -> Recipe {
     if let Some(path) = &origin.options.sky {
         add("--hdri", std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string());
     }
-    let options = &origin.options;
-    let part = [
-        ("--gltf-scene", &options.scene),
-        ("--variant", &options.variant),
-        ("--animation", &options.animation),
-    ];
-    for (flag, value) in part {
-        if let Some(value) = value {
-            add(flag, value.clone());
-        }
-    }
-    let playing = world.get_resource::<Playing>().and_then(|playing| playing.time);
-    if let Some(time) = playing.or(options.time) {
-        add("--time", time.to_string());
+    for (flag, value) in part_flags(world) {
+        add(flag, value);
     }
     if let Some(edits) = unsaved(world, origin) {
         add("--edits", edits);

@@ -90,7 +90,9 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     keep::<Navigation>(app, &mut again);
     keep::<FlySpeed>(app, &mut again);
     keep::<Paused>(app, &mut again);
-    keep::<Clock>(app, &mut again);
+    if let Some(clock) = app.world.get_resource::<Clock>() {
+        again.world.insert_resource(clock.restarted());
+    }
     keep::<PixelView>(app, &mut again);
     if let Some(editor) = app.world.get_resource::<Editor>() {
         for table in tables(&app.world, editor) {

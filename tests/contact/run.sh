@@ -8,7 +8,7 @@ trap 'rm -rf "$sheet"' EXIT
 cd "$scenes"
 find . -name '*.glb' -o -name '*.gltf' -o -name '*.obj' | sort | while read -r scene; do
     name=$(basename "${scene%.*}")
-    [ ! -e "$sheet/$name.png" ] || name=$name-2
+    while [ -e "$sheet/$name.png" ]; do name=$name+; done
     # 4: not all samples in time.
     "$program" render "$scene" -o "$sheet/$name.png" --resolution 256x192 --time-limit 2 --spp 64 --integrator path -q ||
         [ $? = 4 ] || echo "not rendered: $scene" >&2

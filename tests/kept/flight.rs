@@ -125,7 +125,8 @@ pub fn fly(
     }
 }
 
-/// What is flown through, with how much of the error may be left at equal samples.
+/// What is flown through, with how much of the error of a whole new picture of one sample may be left at equal samples: 0.88,
+/// 0.82, 0.55 and 0.59 were measured. (Neighbours share paths: a new picture of `path` is not much worse than old samples.)
 pub fn flights() -> Vec<(String, Integrator, f64)> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
     let kitchen = shared.join("obj/kitchen/kitchen.obj");

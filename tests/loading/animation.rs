@@ -101,6 +101,36 @@ fn all_files_of_a_scene_play() {
 }
 
 #[test]
+fn one_file_of_several_may_have_the_animation_and_edits_are_made_in_its_pose() {
+    let scene = "[[model]]\nfile = 'a.gltf'\n[[model]]\nfile = 'b.obj'\n";
+    let gltf = moving();
+    let files: [(&str, &[u8]); 3] = [
+        ("s.toml", scene.as_bytes()),
+        ("a.gltf", gltf.as_bytes()),
+        ("b.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ];
+    let folder = Folder::new(&files);
+    let back = |animation: &str| LoadOptions { animation: Some(animation.to_owned()), ..at(1.0) };
+    let (mut world, report) = folder.load_with("s.toml", &back("back"));
+    report.unwrap();
+    assert_eq!(place(&mut world, "one").translation, DVec3::X * -2.0);
+    let (_, refused) = folder.load_with("s.toml", &back("jump"));
+    assert_says(&refused.unwrap_err().to_string(), "no animation \"jump\"; it has 0 \"go\"");
+    // What is moved by hand stays there, at whatever time.
+    let (mut world, _) = with(&moving(), &at(1.0));
+    let mut query = world.query::<(Entity, &Name)>();
+    let one = query.iter(&world).find(|(_, name)| name.as_str() == "one").unwrap().0;
+    let path = penumbra::scene::path::path_of(&world, one);
+    let edit = format!(
+        "[[edit]]\nentity = {path:?}\nmatrix = [[1, 0, 0, 0], [0, 1, 0, 9], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+    );
+    let options = LoadOptions { edits: Some(edit), ..at(1.0) };
+    let (mut world, report) = with(&moving(), &options);
+    assert_eq!(report.warnings(), Vec::<String>::new());
+    assert_eq!(place(&mut world, "one").translation, DVec3::Y * 9.0);
+}
+
+#[test]
 fn a_frame_follows_the_clock() {
     let mut app = App::new(RenderSettings::default());
     let folder = Folder::new(&[("a.gltf", moving().as_bytes())]);

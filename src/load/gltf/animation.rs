@@ -64,7 +64,8 @@ pub(super) fn spawn_all(
         }
     }
     let animations = match &sink.options.animation {
-        Some(wanted) => vec![document.chosen(wanted, "animation", &spawned)?],
+        // Another file of the scene may have it.
+        Some(wanted) => document.chosen(wanted, "animation", &spawned).ok().into_iter().collect(),
         None => together,
     };
     if let Some(time) = time {

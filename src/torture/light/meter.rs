@@ -159,7 +159,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// All places; as many samples as the bound needs, or 10⁸.
+    /// All places; as many samples as the bound needs, up to 16 million; or 10⁸.
     #[must_use]
     pub const fn of(id: &'static str) -> Self {
         Self { id, places: &Place::ALL, samples: [1 << 14, 1 << 16, 100_000_000], together: false }
@@ -225,8 +225,8 @@ fn one(
 }
 
 /// Checks by so many samples, from the first number to the second: twice as many, and again, while the standard errors are
-/// too wide; and four times more if the mean is too far off. Where few samples differ from the others, standard errors are
-/// known badly: what was chance goes away, what is wrong gets worse.
+/// too wide; and up to four times more if the mean is too many of them off. Where few samples differ from the others,
+/// standard errors are known badly: chance goes away, a bias that does not shrink faster than they do gets worse.
 ///
 /// None if it was interrupted: what is not complete is not judged.
 pub fn until_sure(
@@ -240,9 +240,10 @@ pub fn until_sure(
         if trial.interrupted() {
             return Vec::new();
         }
-        let broken = |unit: &str| checks.iter().any(|check| check.unit == unit && !check.holds());
+        // What may not happen at all is never chance.
+        let broken = |unit: &str| checks.iter().any(|c| c.unit == unit && !c.holds() && c.limit > 0.0);
         let too_wide = broken("means");
-        let may_be_chance = broken("samples") && again > 0;
+        let may_be_chance = again > 0 && broken("samples");
         if !(too_wide || may_be_chance) || samples >= most {
             return checks;
         }

@@ -196,6 +196,7 @@ fn copy(world: &mut World, editor: &mut Editor) {
         selection: copied,
         property: None,
         transform: None,
+        pose: None,
         light: None,
         material: None,
         hidden: true,

@@ -1,7 +1,7 @@
 //! What was edited, as a settings file that `render` reads.
 
 use super::super::controls::Notice;
-use super::super::flags::camera_flags;
+use super::super::flags::{camera_flags, part_flags};
 use super::Editor;
 use crate::image::Display;
 use crate::load::SceneSource;
@@ -115,10 +115,16 @@ fn write(world: &World, editor: &Editor) -> Result<String, String> {
     Err("no number is left".to_owned())
 }
 
-/// The flags of the camera and of the exposure, which the edits may not speak of.
+/// The flags of what the edits may not speak of: part of the file, time, camera and exposure.
 fn look(world: &World) -> String {
     let display = world.resource::<Display>();
     let mut flags = format!("--exposure {}", display.exposure);
+    for (flag, value) in part_flags(world) {
+        // As a shell takes it, whatever the file calls its things.
+        let is_plain = value.chars().all(|c| c.is_ascii_alphanumeric() || "._-".contains(c));
+        let quoted = if is_plain { value } else { format!("'{}'", value.replace('\'', r"'\''")) };
+        flags += &format!(" {flag} {quoted}");
+    }
     let active = world.resource::<ActiveCamera>().0;
     if let (Some(camera), Some(pose)) = (world.get::<Camera>(active), world.get::<GlobalTransform>(active)) {
         flags += &format!(" {}", camera_flags(*camera, *pose, world.get::<Lens>(active).copied()));

@@ -2,7 +2,7 @@
 
 use super::property::{Property, material_of};
 use super::{Editor, Selection, say};
-use crate::scene::{Hidden, Light, Material, Transform};
+use crate::scene::{Hidden, Light, Material, Pose, Transform};
 use bevy_ecs::prelude::*;
 
 /// How things were.
@@ -12,6 +12,8 @@ pub(super) struct Undo {
     /// Changes of one number in a row are one step.
     pub(super) property: Option<Property>,
     pub(super) transform: Option<Transform>,
+    /// Where the animation, if there is one, had put it.
+    pub(super) pose: Option<Pose>,
     pub(super) light: Option<Light>,
     pub(super) material: Option<(Entity, Material)>,
     pub(super) hidden: bool,
@@ -29,6 +31,7 @@ pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection,
         selection,
         property,
         transform: world.get::<Transform>(entity).copied(),
+        pose: world.get::<Pose>(entity).copied(),
         light: world.get::<Light>(entity).cloned(),
         material: material.and_then(|m| Some((m, world.get::<Material>(m)?.clone()))),
         hidden: world.get::<Hidden>(entity).is_some(),
@@ -38,7 +41,9 @@ pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection,
 pub(super) fn undo(world: &mut World, editor: &mut Editor) {
     let Some(last) = editor.undo.pop() else { return say(world, "nothing to undo") };
     let entity = last.selection.entity;
+    // What an animation has moved since stays where that put it.
     if let Some(transform) = last.transform
+        && world.get::<Pose>(entity).copied() == last.pose
         && let Some(mut now) = world.get_mut::<Transform>(entity)
     {
         now.set_if_neq(transform);
