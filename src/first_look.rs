@@ -17,6 +17,8 @@ const PROBE_SAMPLES: u32 = 4;
 const DARK: f32 = 0.01;
 /// ... and a scene if this share of its surfaces is.
 const MOSTLY: f32 = 0.7;
+/// What glows by less than this share of its colour would show as much of itself in ordinary light: it is no lamp.
+const FAINT: f32 = 0.25;
 /// Share of the seen surfaces that may be dark because their pixels are at an edge, or black parts of what shines; ...
 const OUTLINE: f32 = 0.1;
 /// ... and that may be dark though they neither shine nor are beside a lit one.
@@ -57,16 +59,26 @@ fn is_mostly_dark(app: &App, picture: &Film) -> bool {
     let size = picture.size();
     let width = size.x as usize;
     let mut seen: Vec<Option<(f32, bool)>> = Vec::new();
+    let mut faint = 0.0;
     for y in 0..size.y {
         for (x, pixel) in (0..size.x).zip(picture.row(y)) {
             let ray = scene.viewpoint.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size);
             seen.push(scene.geometry.tlas.closest_hit(&ray).map(|hit| {
-                let shines = scene.surface_at(&hit).1.material.emission != Vec3::ZERO;
-                (luminance(pixel.mean().as_vec3()), shines)
+                let (material, shown) =
+                    (&scene.surface_at(&hit).1.material, luminance(pixel.mean().as_vec3()));
+                let shines = material.emission != Vec3::ZERO;
+                faint +=
+                    f32::from(shines && !material.unlit && shown < FAINT * luminance(material.base_color));
+                (shown, shines)
             }));
         }
     }
     let surfaces = || seen.iter().flatten();
+    let all = surfaces().count() as f32;
+    // Programs for modelling write down a faint glow that never was to be the only light.
+    if faint > (1.0 - OUTLINE) * all {
+        return true;
+    }
     let mut lit: Vec<f32> = surfaces().map(|&(l, _)| l).filter(|&l| l > 0.0).collect();
     if lit.is_empty() {
         return surfaces().next().is_some();
@@ -84,6 +96,6 @@ fn is_mostly_dark(app: &App, picture: &Film) -> bool {
         let inside = i >= width && (1..width - 1).contains(&(i % width));
         is_plain && inside && [i, i + 1, i - 1, i + width, i - width].into_iter().all(is_dark)
     };
-    let (inner, all) = ((0..seen.len()).filter(within).count() as f32, surfaces().count() as f32);
+    let inner = (0..seen.len()).filter(within).count() as f32;
     (inner > SPECKS * all || dark > OUTLINE * all) && dark > MOSTLY * others
 }

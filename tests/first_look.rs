@@ -66,6 +66,15 @@ fn a_glowing_thing_alone_stays_alone() {
 }
 
 #[test]
+fn a_faint_glow_of_everything_is_no_lamp() {
+    let box_of = |glow: &str| {
+        let mtl = MTL.replace("Kd .5 .5 .5", &format!("Kd .6 .6 .6\nKe {glow}"));
+        lights(&mut opened("faint", "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl floor\nf 1 2 3\n", &mtl))
+    };
+    assert_eq!((box_of("0 0 .1"), box_of("0 0 5")), (2, 0));
+}
+
+#[test]
 fn a_dark_island_in_a_glowing_sea_gets_light() {
     let sea = "v -4 0 4\nv 4 0 4\nv 4 0 -4\nv -4 0 -4\nusemtl lamp\nf 1 2 3 4\n";
     let island = "v -1 .1 1\nv 1 .1 1\nv 1 .1 -1\nv -1 .1 -1\nusemtl floor\nf 5 6 7 8\n";

@@ -66,6 +66,15 @@ impl Folder {
         }
     }
 
+    /// Whether [`Folder::read`] would find a file.
+    pub(super) fn has(&self, reference: &str) -> bool {
+        let relative = inside(&reference.replace('\\', "/"));
+        relative.is_some_and(|relative| match self {
+            Self::Disk(folder) => any_case(folder, &relative).is_ok_and(|path| path.is_file()),
+            Self::BuiltIn => builtin::asset(&relative.to_string_lossy()).is_some(),
+        })
+    }
+
     /// As [`Folder::read`]; a path that is absolute, elsewhere or missing is tried once more by its
     /// bare file name, because exporters write the paths of the machine they ran on.
     pub(super) fn read_or_neighbour(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {

@@ -222,6 +222,26 @@ fn damaged_accessors_and_containers_are_refused_with_their_place() {
 }
 
 #[test]
+fn binary_data_right_behind_text_of_an_odd_length_is_found() {
+    let positions: Vec<u8> =
+        [0_f32, 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|number| number.to_le_bytes()).collect();
+    for spaces in 0..4 {
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":36}}],"bufferViews":[{{"buffer":0,"byteLength":36}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],"nodes":[{{"mesh":0}}]{}}}"#,
+            " ".repeat(spaces)
+        );
+        let chunk = |kind: &[u8; 4], data: &[u8]| {
+            [&(data.len() as u32).to_le_bytes(), kind.as_slice(), data].concat()
+        };
+        let body = [chunk(b"JSON", json.as_bytes()), chunk(b"BIN\0", &positions)].concat();
+        let head =
+            [b"glTF".as_slice(), &2_u32.to_le_bytes(), &(12 + body.len() as u32).to_le_bytes()].concat();
+        let (_, report) = loaded_all(&[("a.glb", &[head, body].concat())]);
+        assert_eq!(report.triangles, 1, "{spaces}");
+    }
+}
+
+#[test]
 fn a_skinned_mesh_stands_where_its_joints_are() {
     let more = r#","skins":[{"joints":[1]}]"#;
     let nodes = r#""nodes":[{"mesh":0,"skin":0,"translation":[100,0,0]},{"translation":[0,5,0]}],"#;

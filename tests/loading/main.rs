@@ -37,7 +37,9 @@ impl Folder {
         let folder = Self(std::env::temp_dir().join(name));
         std::fs::create_dir_all(&folder.0).unwrap();
         for (name, content) in files {
-            std::fs::write(folder.0.join(name), content).unwrap();
+            let path = folder.0.join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, content).unwrap();
         }
         folder
     }

@@ -95,6 +95,69 @@ fn several_libraries_and_names_with_spaces_are_found() {
 }
 
 #[test]
+fn several_names_with_spaces_in_one_statement_are_told_apart() {
+    let obj = format!("mtllib my  a.mtl my b.mtl no such.mtl my\\ c.mtl\n{QUAD}f 1 2 3\n");
+    let (mut world, report) = loaded_all(&[
+        ("a.obj", obj.as_bytes()),
+        ("my a.mtl", b"newmtl one\nKd 1 0 0\n"),
+        ("my b.mtl", b"newmtl two\nKd 0 1 0\n"),
+        ("my c.mtl", b"newmtl three\nKd 0 0 1\n"),
+    ]);
+    let warnings = report.warnings();
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert_says(&warnings[0], "`no such.mtl`");
+    let colors = ["one", "two", "three"].map(|name| named::<Material>(&mut world, name).base_color);
+    assert_eq!(colors, [Vec3::X, Vec3::Y, Vec3::Z]);
+}
+
+#[test]
+fn a_statement_of_a_million_names_is_no_work() {
+    let obj = format!("mtllib {}\n{QUAD}f 1 2 3\n", "a b.mtl c ".repeat(300_000));
+    let started = std::time::Instant::now();
+    let (_, report) = loaded_all(&[("a.obj", obj.as_bytes())]);
+    assert!(started.elapsed().as_secs() < 10);
+    let warnings = report.warnings().join("\n");
+    assert_says(&warnings, "`a b.mtl`");
+    assert_says(&warnings, "material libraries after the first 256");
+    // The same again and again is one.
+    let obj = format!("mtllib a.mtl\n{QUAD}f 1 2 3\n").repeat(1000);
+    let (_, report) = loaded_all(&[("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl m\n")]);
+    assert_eq!(report.warnings(), [""; 0]);
+    // Each another name.
+    let names: String = (0..300_000).map(|i| format!("{i}.mtl ")).collect();
+    let (_, report) = loaded_all(&[("a.obj", format!("mtllib {names}\n{QUAD}f 1 2 3\n").as_bytes())]);
+    assert!(started.elapsed().as_secs() < 20);
+    assert!(report.warnings().len() <= 257, "{}", report.warnings().len());
+}
+
+#[test]
+fn pictures_of_a_library_in_a_folder_of_its_own_are_found_there() {
+    let obj = format!("mtllib looks\\\\a.mtl\n{QUAD}usemtl m\nf 1 2 3\n");
+    let mtl = b"newmtl m\nmap_Kd -s 2 2 1 .\\images\\red.png\nmap_Ke -clamp on ../Glow.png\n\
+        map_Ks C:\\old\\blue.png\nmap_d whole.png\nKs 1 1 1\nNs 5\n";
+    let (mut world, report) = loaded_all(&[
+        ("a.obj", obj.as_bytes()),
+        ("looks/a.mtl", mtl),
+        ("looks/images/red.png", &png([200, 0, 0, 255])),
+        ("looks/blue.png", &png([0, 0, 200, 255])),
+        ("images/red.png", &png([1, 1, 1, 255])),
+        ("glow.png", &png([9, 9, 9, 255])),
+        ("whole.png", &png([255; 4])),
+    ]);
+    let warnings = report.warnings().join("\n");
+    assert!(!warnings.contains("no such file"), "{warnings}");
+    let material = named::<Material>(&mut world, "m");
+    let texel = |texture: penumbra::scene::TextureUse| {
+        world.get::<Texture>(texture.texture).unwrap().texels.texels[0]
+    };
+    assert_eq!(texel(material.base_color_texture.unwrap())[..3], [200, 0, 0]);
+    assert_eq!(material.emission, Vec3::ONE, "a map alone is the value itself");
+    assert_eq!(texel(material.emission_texture.unwrap())[..3], [9, 9, 9]);
+    let Glossy::BlinnPhong { texture, .. } = material.glossy else { panic!("not glossy") };
+    assert_eq!(texel(texture.unwrap())[..3], [0, 0, 200]);
+}
+
+#[test]
 fn names_in_an_old_encoding_still_meet() {
     // Latin-1: the file is called Bäume.mtl on disk in UTF-8.
     let obj = [b"mtllib B\xe4ume.mtl\nusemtl gr\xfcn\n".as_slice(), QUAD.as_bytes(), b"f 1 2 3\n"].concat();

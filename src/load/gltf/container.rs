@@ -44,8 +44,11 @@ pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, Lo
             b"BIN\0" if binary.is_none() => binary = Some(data),
             _ => {} // The specification asks to skip what is not known.
         }
-        // An odd length at the very end would point past it.
-        rest = rest.get(8 + (length as usize).next_multiple_of(4)..).unwrap_or_default();
+        // Some writers forget to fill up to a multiple of four. An odd length at the very end would point past it.
+        let end = 8 + length as usize;
+        let is_next = word(rest, end + 4).is_some_and(|kind| &kind.to_le_bytes() == b"BIN\0");
+        let next = if is_next { end } else { end.next_multiple_of(4) };
+        rest = rest.get(next..).unwrap_or_default();
     }
     let json = json.ok_or_else(|| damaged("no JSON chunk: length too small or wrong type".to_owned()))?;
     Ok(Container { json, binary })

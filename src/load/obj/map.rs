@@ -1,9 +1,10 @@
 //! `map_` statements of MTL libraries: options, pictures, textures.
 
 use super::relief;
+use crate::load::error::ReadError;
 use crate::load::picture::{self, Picture};
 use crate::load::report::Sink;
-use crate::load::source::{Folder, IMAGE_LIMIT};
+use crate::load::source::{Bytes, Folder, IMAGE_LIMIT};
 use crate::scene::{Encoding, Filter, NormalMap, Texels, Texture, TextureUse, Wrap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -95,6 +96,30 @@ fn statement<'m>(material: &'m tobj::Material, keyword: &str) -> Option<&'m str>
     known.as_deref()
 }
 
+/// What stands between the folder of a library and the name that it gives.
+const BESIDE: &str = "//";
+
+/// The same statement as the scene's folder sees it: names in a library count from the library's folder.
+pub(super) fn beside(library: &str, statement: &str) -> String {
+    let Some((folder, _)) = library.rsplit_once(['/', '\\']) else { return statement.to_owned() };
+    let name = Map::parse(statement).name;
+    let options = statement.trim_end().strip_suffix(name).unwrap_or_default();
+    format!("{options}{folder}{BESIDE}{name}")
+}
+
+/// Looks for a picture in the folder of its library, then in the scene's.
+fn read(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
+    let Some((library, own)) = name.split_once(BESIDE) else {
+        return folder.read_or_neighbour(name, IMAGE_LIMIT);
+    };
+    let bare = own.rsplit(['/', '\\']).next().unwrap_or(own);
+    let there = [own, bare].map(|name| format!("{library}/{name}"));
+    match there.iter().find(|name| folder.has(name)) {
+        Some(name) => folder.read(name, IMAGE_LIMIT),
+        None => folder.read_or_neighbour(own, IMAGE_LIMIT),
+    }
+}
+
 /// Decoded images of a library by file name.
 pub(super) struct Textures {
     images: BTreeMap<String, Arc<Texels>>,
@@ -116,8 +141,8 @@ impl Textures {
             for statement in STATEMENTS.iter().filter_map(|keyword| statement(material, keyword)) {
                 let name = Map::parse(statement).name;
                 pictures.entry(name.to_owned()).or_insert_with(|| Picture {
-                    label: format!("texture `{name}`"),
-                    bytes: folder.read_or_neighbour(name, IMAGE_LIMIT),
+                    label: format!("texture `{}`", name.replace(BESIDE, "/")),
+                    bytes: read(folder, name),
                     strict: false,
                 });
             }
@@ -205,7 +230,7 @@ impl Textures {
     ) -> TextureUse {
         let texture = *self.spawned.entry(key).or_insert_with(|| {
             let texture = Texture { texels, encoding, wrap: map.wrap(), filter: Filter::Bilinear };
-            sink.spawn((Name::new(map.name.to_owned()), texture))
+            sink.spawn((Name::new(map.name.replace(BESIDE, "/")), texture))
         });
         TextureUse { texture, uv_transform: map.uv_transform(), second_uvs: false }
     }

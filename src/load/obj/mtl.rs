@@ -1,16 +1,15 @@
 //! MTL libraries → material entities. `tobj` parses what [`tidy`] lets through.
 
 use super::lines::{self, Statement};
-use super::map::Textures;
-use crate::load::error::ReadError;
+use super::map::{self, Textures};
 use crate::load::report::Sink;
 use crate::load::settings::Materials;
-use crate::load::source::{Bytes, Folder, TEXT_LIMIT};
+use crate::load::source::{Folder, TEXT_LIMIT};
 use crate::scene::{Alpha, Anisotropy, Clearcoat, Glass, Glossy, Layers, Material, Sheen};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Reads all libraries and spawns their materials; the first of a name counts.
@@ -22,9 +21,24 @@ pub(super) fn spawn_all(
     sink: &mut Sink<'_>,
 ) -> BTreeMap<String, Entity> {
     let mut parsed: Vec<tobj::Material> = Vec::new();
-    for library in libraries {
-        for (name, bytes) in open(file, folder, library, sink) {
-            parsed.extend(parse(file, &name, &bytes, sink));
+    // Some programs repeat the statement for every object.
+    let mut unread: BTreeSet<&String> = libraries.iter().collect();
+    let in_order = libraries.iter().filter(|&statement| unread.remove(statement));
+    let mut known = BTreeSet::new();
+    for (i, library) in in_order.flat_map(|statement| libraries_of(folder, statement)).enumerate() {
+        if i == MOST_LIBRARIES {
+            sink.ignored(file, "", format!("material libraries after the first {MOST_LIBRARIES}"));
+            break;
+        }
+        if !known.insert(library.clone()) {
+            continue;
+        }
+        match folder.read_or_neighbour(&library, TEXT_LIMIT) {
+            Ok(bytes) => parsed.extend(parse(file, &library, &bytes, sink)),
+            Err(why) => {
+                let what = format!("material library `{library}`: {why}; its materials are light grey");
+                sink.repaired(file, "", what);
+            }
         }
     }
     let mut textures = Textures::new(file, folder, &parsed, sink);
@@ -44,22 +58,30 @@ pub(super) fn spawn_all(
     entities
 }
 
-/// The files of one `mtllib` statement: one name with spaces, or several names.
-fn open(file: &str, folder: &Folder, library: &str, sink: &mut Sink<'_>) -> Vec<(String, Bytes)> {
-    let mut found = Vec::new();
-    let whole = folder.read_or_neighbour(library, TEXT_LIMIT);
-    let several = library.split_ascii_whitespace().count() > 1 && matches!(whole, Err(ReadError::Missing));
-    let names: Vec<&str> = if several { library.split_ascii_whitespace().collect() } else { vec![library] };
-    for name in names {
-        match folder.read_or_neighbour(name, TEXT_LIMIT) {
-            Ok(bytes) => found.push((name.to_owned(), bytes)),
-            Err(why) => {
-                let what = format!("material library `{name}`: {why}; its materials are light grey");
-                sink.repaired(file, "", what);
-            }
+/// More than any scene has: each costs a look into the folder.
+const MOST_LIBRARIES: usize = 256;
+/// Most words of a name with spaces.
+const MOST_WORDS: usize = 8;
+
+/// The names in one `mtllib` statement: several, with spaces in them (`\ ` in some programs), or both. Where words could be
+/// one name or several, the longest is meant that is there, else one up to its `.mtl`.
+fn libraries_of<'a>(folder: &'a Folder, statement: &str) -> impl Iterator<Item = String> + use<'a> {
+    let marked = statement.replace("\\ ", "\0");
+    let words: Vec<String> = marked.split_ascii_whitespace().map(|word| word.replace('\0', " ")).collect();
+    let mut whole = Some(statement.to_owned()).filter(|whole| words.len() > 1 && folder.has(whole));
+    let mut first = if whole.is_some() { words.len() } else { 0 };
+    std::iter::from_fn(move || {
+        if whole.is_some() {
+            return whole.take();
         }
-    }
-    found
+        let rest = words.get(first..).filter(|rest| !rest.is_empty())?;
+        let most = rest.len().min(MOST_WORDS);
+        let there = (2..=most).rev().find(|&count| folder.has(&rest[..count].join(" ")));
+        let is_end = |&count: &usize| rest[count - 1].to_ascii_lowercase().ends_with(".mtl");
+        let count = there.or_else(|| (1..=most).find(is_end)).unwrap_or(1);
+        first += count;
+        Some(rest[..count].join(" "))
+    })
 }
 
 fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<tobj::Material> {
@@ -126,7 +148,7 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
                 if rest.is_empty() {
                     ignore("without a file name, ignored")
                 } else {
-                    writeln!(tidied, "{map} {rest}")
+                    writeln!(tidied, "{map} {}", map::beside(library, rest))
                 }
             }
             ("disp" | "decal" | "refl", _) => {
@@ -168,7 +190,10 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         unit(material.diffuse.map_or(Vec3::splat(if has_texture { 1.0 } else { 0.8 }), Vec3::from));
     let mut specular = unit(material.specular.map_or(Vec3::ZERO, Vec3::from));
     let tint = unit(color(material, "Tf").unwrap_or(Vec3::ONE));
-    let emission = material.emissive.map_or(Vec3::ZERO, Vec3::from).max(Vec3::ZERO);
+    let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
+    // A map alone is the value itself.
+    let unsaid = if is_mapped("map_Ke") { Vec3::ONE } else { Vec3::ZERO };
+    let emission = material.emissive.map_or(unsaid, Vec3::from).max(Vec3::ZERO);
     let exponent = within(material.shininess.unwrap_or(0.0), 0.0, 1e6);
     let opacity = material
         .dissolve
@@ -180,10 +205,8 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         });
     let opacity = within(opacity.unwrap_or(1.0), 0.0, 1.0);
     let mut fraction = |keyword: &str| scalar(material, keyword).map(|value| within(value, 0.0, 1.0));
-    let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
     let pbr = match (fraction("Pr"), fraction("Pm")) {
         (None, None) if !is_mapped("map_Pr") && !is_mapped("map_Pm") => None,
-        // A map alone is the value itself.
         (rough, metal) => Some((
             rough.unwrap_or(if is_mapped("map_Pr") { 1.0 } else { 0.5 }),
             metal.unwrap_or(if is_mapped("map_Pm") { 1.0 } else { 0.0 }),
