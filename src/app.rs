@@ -8,7 +8,7 @@ use crate::shown::{Shown, develop_film, keep};
 use crate::sync::{self, BlasCache, Instructions, MaterialNumbers, Redone, RenderOrigin, Traceable};
 use crate::trace::noise;
 use crate::trace::{
-    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, Viewpoint, trace_adaptive,
+    Coverage, Film, Geometry, Lights, RayCounts, RenderSettings, Surfaces, Viewpoint, hurry, trace_adaptive,
     trace_half, trace_pass,
 };
 use bevy_ecs::prelude::*;
@@ -49,6 +49,8 @@ pub struct FrameBudget {
     /// More samples go where there is more noise. And without a preview the first go to half of the pixels everywhere, if
     /// neighbours share paths: no film in files is like that.
     pub adaptive: bool,
+    /// All the time there will be, if that is known: where it is short, the first samples go where they are needed most.
+    pub limit: Option<Duration>,
     /// Samples per pixel after which nothing more is traced.
     pub sample_target: u32,
     /// Samples per pixel of one pass, if there is no time limit.
@@ -67,6 +69,7 @@ impl Default for FrameBudget {
             time: None,
             interrupt: Arc::default(),
             adaptive: false,
+            limit: None,
             sample_target: 64,
             pass_samples: 1,
             region: None,
@@ -223,6 +226,19 @@ fn is_worth_developing(budget: Res<FrameBudget>, stats: Res<FrameStats>) -> bool
     budget.develop && (stats.begun || !budget.interrupt.load(Ordering::Relaxed))
 }
 
+/// Time for fewer samples than that is short.
+const FEW_SAMPLES: f64 = 5.0;
+
+/// How many times as long as an estimate of the noise takes is traced before the next, unless it is asked for.
+const ESTIMATE: f64 = 12.0;
+
+/// When the noise was estimated, in seconds of tracing, and how long that took.
+#[derive(Default)]
+pub struct Estimated {
+    at: f64,
+    took: f64,
+}
+
 /// Adds samples to the film within the budget; first of all a preview, if somebody watches.
 pub fn trace_frame(
     inputs: Traceable,
@@ -232,6 +248,7 @@ pub fn trace_frame(
     mut stats: ResMut<FrameStats>,
     redone: Res<Redone>,
     mut previewed: Local<u64>,
+    mut estimated: Local<Estimated>,
 ) {
     let scene = inputs.scene();
     // Sample indices end with u32: nobody waits for those beyond.
@@ -248,6 +265,7 @@ pub fn trace_frame(
     if stats.begun {
         stats.noise = None;
         stats.noise_samples = 0;
+        estimated.at = f64::NEG_INFINITY;
         if budget.preview {
             match preview.trace(&scene) {
                 Some(counts) => rays = rays + counts,
@@ -273,6 +291,10 @@ pub fn trace_frame(
     }
     while film.complete_samples() < target && keep_going() {
         let step = budget.pass_samples;
+        let spent = stats.trace_seconds + start.elapsed().as_secs_f64();
+        if budget.adaptive && budget.limit.is_some_and(|limit| FEW_SAMPLES * spent > limit.as_secs_f64()) {
+            hurry(&scene, &mut film);
+        }
         rays = rays
             + if budget.adaptive && (budget.region.is_none() || film.is_allotted()) {
                 trace_adaptive(&scene, &mut film, target, step, keep_going)
@@ -293,15 +315,19 @@ pub fn trace_frame(
     stats.done = film.complete_samples() >= target;
     stats.preview_scale = (film.complete_samples() == 0).then(|| preview.scale()).filter(|&s| s > 1);
     stats.dropped = film.dropped();
-    // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter.
+    // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter, if by then it has
+    // become cheap beside them.
+    let is_cheap = stats.trace_seconds - estimated.at >= ESTIMATE * estimated.took;
     let complete = film.complete_samples();
     let has_time = stats.done || !(budget.develop && budget.interrupt.load(Ordering::Relaxed));
     if complete >= 2
         && has_time
-        && (complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
+        && (is_cheap && complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
         && complete != stats.noise_samples
     {
+        let start = Instant::now();
         let noise = noise::estimate(&film);
+        *estimated = Estimated { at: stats.trace_seconds, took: start.elapsed().as_secs_f64() };
         stats.noise = noise.map(|noise| noise.relative);
         stats.noise_doubt = noise.map_or(0.0, |noise| noise.doubt);
         stats.noise_samples = complete;

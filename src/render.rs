@@ -191,6 +191,7 @@ pub fn render(
 
     app.world.insert_resource(FrameBudget {
         adaptive: open_end && asked.is_none() && !films && !job.even,
+        limit: job.time_limit,
         interrupt: Arc::clone(&job.interrupt),
         ..FrameBudget::default()
     });

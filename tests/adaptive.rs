@@ -8,8 +8,9 @@ use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::FrameBudget;
 use penumbra::scene::{Light, Material};
 use penumbra::trace::allot::{EVEN, shares};
-use penumbra::trace::{Film, Integrator, RenderSettings, TraceScene, trace_adaptive, trace_pass};
+use penumbra::trace::{Film, Integrator, RenderSettings, TraceScene, hurry, trace_adaptive, trace_pass};
 use stage::{Frames as _, Stage, quad, reds, settings};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 
@@ -126,4 +127,66 @@ fn a_frame_budget_asks_for_it() {
     stage.app.world.resource_mut::<FrameBudget>().adaptive = true;
     let film = stage.trace(40);
     assert!(film.is_allotted());
+}
+
+/// A film in a hurry, broken off whenever it has asked so often whether to go on.
+fn hurried(stage: &Stage, samples: u32, patience: u32) -> Film {
+    let scene = stage.scene();
+    let mut film = Film::new(scene.settings.size, 0);
+    trace_pass(&scene, &mut film, 1, 1, || true);
+    hurry(&scene, &mut film);
+    for turn in 0.. {
+        if film.complete_samples() >= samples {
+            break;
+        }
+        assert!(turn < 10_000, "never ends");
+        let asked = AtomicU32::new(0);
+        trace_adaptive(&scene, &mut film, samples, 1, || asked.fetch_add(1, Ordering::Relaxed) < patience);
+    }
+    film
+}
+
+#[test]
+fn in_a_hurry_the_second_sample_goes_to_the_edge_and_nobody_loses_the_third() {
+    let stage = edge(96);
+    let film = hurried(&stage, 2, u32::MAX);
+    let across = |film: &Film, x: [u32; 2]| {
+        let counts =
+            (x[0]..x[1]).flat_map(|x| (0..96).map(move |y| (x, y))).map(|(x, y)| film.pixel(x, y).count());
+        counts.sum::<u64>() as f64 / f64::from(96 * (x[1] - x[0]))
+    };
+    assert!((1.5..2.2).contains(&film.mean_samples()), "{}", film.mean_samples());
+    let [light, penumbra, dark] = [[0, 20], [40, 56], [76, 96]].map(|x| across(&film, x));
+    println!("samples in the light, the penumbra, the dark: {light:.2} {penumbra:.2} {dark:.2}");
+    assert!(dark == 1.0 && light < 2.5 && penumbra > 2.0 * light, "{light} {penumbra} {dark}");
+    let film = hurried(&stage, EVEN, u32::MAX);
+    assert!((0..96 * 96).all(|i| film.pixel(i % 96, i / 96).count() >= u64::from(EVEN)));
+    assert!(film.is_allotted() && !film.has_first_shares());
+    // Those who had more are waited for.
+    let film = hurried(&stage, 24, u32::MAX);
+    assert!((film.mean_samples() - 24.0).abs() < 1.0, "{}", film.mean_samples());
+}
+
+#[test]
+fn a_hurry_that_is_broken_off_comes_to_the_same() {
+    let stage = edge(40);
+    assert!(hurried(&stage, 9, 3) == hurried(&stage, 9, u32::MAX));
+}
+
+#[test]
+fn a_hurry_ends_also_where_only_a_part_is_refined() {
+    let stage = edge(40);
+    let scene = stage.scene();
+    let mut film = Film::new(scene.settings.size, 0);
+    trace_pass(&scene, &mut film, 1, 1, || true);
+    hurry(&scene, &mut film);
+    film.confine(Some([UVec2::splat(8), UVec2::splat(16)]));
+    for _ in 0..20 {
+        trace_adaptive(&scene, &mut film, 6, 1, || true);
+    }
+    assert_eq!(film.complete_samples(), 6);
+    film.confine(None);
+    assert_eq!(film.complete_samples(), EVEN);
+    film.reset();
+    assert!(!film.has_first_shares() && !film.is_allotted());
 }

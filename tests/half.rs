@@ -3,7 +3,7 @@
 #[path = "support/stage.rs"]
 mod stage;
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::image::files::linear_pixels;
 use penumbra::scene::{Light, Material};
 use penumbra::trace::film::Tile;
@@ -65,4 +65,28 @@ fn a_half_picture_has_no_holes() {
     }
     film.reset();
     assert!(!film.tiles().iter().any(Tile::is_half));
+}
+
+#[test]
+fn a_picture_that_was_hardly_begun_has_no_holes() {
+    let stage = floor(Integrator::Direct);
+    let scene = stage.scene();
+    let whole = {
+        let mut film = Film::new(scene.settings.size, 0);
+        trace_pass(&scene, &mut film, 1, 1, || true);
+        linear_pixels(&film)
+    };
+    // Four of fifteen tiles, one after the other.
+    let asked = AtomicU32::new(0);
+    let mut film = Film::new(scene.settings.size, 0);
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    one.install(|| trace_pass(&scene, &mut film, 1, 1, || asked.fetch_add(1, Ordering::Relaxed) < 4));
+    assert!((0.1..0.5).contains(&film.looked_at()), "{}", film.looked_at());
+    for (guess, truth) in linear_pixels(&film).iter().zip(whole) {
+        assert!((0.3..3.0).contains(&(guess.x / truth.x)), "{guess} for {truth}");
+    }
+    // Black where nobody has looked, if the rest is to be: of a part of the picture that is refined alone, and of dropped samples.
+    film.confine(Some([UVec2::ZERO, UVec2::splat(8)]));
+    assert!(linear_pixels(&film).contains(&Vec3::ZERO));
+    assert!(linear_pixels(&Film::new(UVec2::splat(9), 0)).iter().all(|pixel| *pixel == Vec3::ZERO));
 }

@@ -4,8 +4,7 @@ use super::compare::LinearImage;
 use super::develop::Display;
 use super::develop::{develop, develop_image};
 use crate::trace::Film;
-use crate::trace::film::Tile;
-use glam::{DVec3, IVec2, UVec2, Vec3};
+use glam::{UVec2, Vec3};
 use image::{ImageFormat, Rgb32FImage, RgbaImage};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -73,7 +72,7 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
     let codec = |source| ImageError::Codec { path: path.to_path_buf(), source };
     match format {
         PictureFormat::Png => {
-            let developed = if film.tiles().iter().any(Tile::is_half) {
+            let developed = if is_guessed(film) {
                 develop_image(&LinearImage::of(film), display)
             } else {
                 develop(film, None, display)
@@ -91,30 +90,53 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
     write_whole(path, bytes.get_ref())
 }
 
-/// Mean radiances, rows from the top. Of a film that is half looked at, what is missing is the mean of its neighbours if any
-/// has been looked at.
+/// Mean radiances, rows from the top. Where there was not even time for a sample of each pixel, the others are guessed.
 #[must_use]
 pub fn linear_pixels(film: &Film) -> Vec<Vec3> {
-    let size = film.size();
-    let mut pixels: Vec<Vec3> =
-        (0..size.y).flat_map(|y| film.row(y)).map(|pixel| pixel.mean().as_vec3()).collect();
-    let half = film.tiles().iter().any(Tile::is_half);
-    for tile in film.tiles().iter().filter(|_| half) {
-        for (i, _) in (0..).zip(tile.pixels()).filter(|(_, pixel)| pixel.count() == 0) {
-            let at = tile.origin + UVec2::new(i % tile.size.x, i / tile.size.x);
-            let around = [(-1, 0), (1, 0), (0, -1), (0, 1)]
-                .map(|(x, y)| at.wrapping_add_signed(IVec2::new(x, y)))
-                .into_iter()
-                .filter(|there| there.cmplt(size).all())
-                .map(|there| film.pixel(there.x, there.y))
-                .filter(|pixel| pixel.count() > 0);
-            let (sum, count) = around.fold((DVec3::ZERO, 0.0), |(sum, n), p| (sum + p.mean(), n + 1.0));
-            if count > 0.0 {
-                pixels[(at.y * size.x + at.x) as usize] = (sum / count).as_vec3();
-            }
-        }
+    let pixels = || (0..film.size().y).flat_map(|y| film.row(y));
+    let mut means: Vec<Vec3> = pixels().map(|pixel| pixel.mean().as_vec3()).collect();
+    if is_guessed(film) {
+        let known = pixels().map(|pixel| pixel.count() > 0).collect();
+        fill(&mut means, known, film.size());
     }
-    pixels
+    means
+}
+
+/// Whether it has pixels that nobody has looked at yet. (Those of which all samples were dropped stay black.)
+fn is_guessed(film: &Film) -> bool {
+    film.complete_samples() == 0 && film.region().is_none()
+}
+
+/// Gives each pixel that is not `known` the mean of those beside it that are, one ring after the other.
+fn fill(pixels: &mut [Vec3], mut known: Vec<bool>, size: UVec2) {
+    let beside = |at: usize| {
+        let (at, across) = (at as u32, size.x);
+        let (x, y) = (at % across, at / across);
+        let there = [
+            (x > 0).then(|| at - 1),
+            (x + 1 < across).then(|| at + 1),
+            (y > 0).then(|| at - across),
+            (y + 1 < size.y).then(|| at + across),
+        ];
+        there.into_iter().flatten().map(|at| at as usize)
+    };
+    let mut waits: Vec<bool> = known.iter().map(|known| !known).collect();
+    let mut ring: Vec<usize> =
+        (0..pixels.len()).filter(|&at| waits[at] && beside(at).any(|there| known[there])).collect();
+    while !ring.is_empty() {
+        ring.iter().for_each(|&at| waits[at] = false);
+        for &at in &ring {
+            let around = beside(at).filter(|&there| known[there]);
+            let (sum, count) =
+                around.fold((Vec3::ZERO, 0.0), |(sum, count), there| (sum + pixels[there], count + 1.0));
+            pixels[at] = sum / count;
+        }
+        ring.iter().for_each(|&at| known[at] = true);
+        let mut next: Vec<usize> = ring.iter().flat_map(|&at| beside(at)).filter(|&at| waits[at]).collect();
+        next.sort_unstable();
+        next.dedup();
+        ring = next;
+    }
 }
 
 /// Writes beside `path` and renames, so that nobody ever sees half a file.

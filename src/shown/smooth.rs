@@ -154,7 +154,7 @@ fn variances(
     keep_going: &(impl Fn() -> bool + Sync),
 ) -> Option<Vec<f32>> {
     let [width, height] = film.size().to_array().map(|n| n as usize);
-    let has_halves = film.complete_samples() >= 2;
+    let has_halves = film.complete_samples() >= 2 && !film.has_first_shares();
     let mut own = vec![0.0; cells.len()];
     if has_halves {
         own.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {

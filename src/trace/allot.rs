@@ -6,100 +6,141 @@
 
 use super::Film;
 use crate::scene::color::luminance;
-use glam::DVec3;
+use glam::{UVec2, Vec4};
 
 /// Even samples per pixel before shares are given out.
 pub const EVEN: u32 = 3;
 /// Nobody gets less than this share, or more than that many: what the first samples have missed must have its
 /// chance.
-const LEAST: f64 = 0.05;
-const MOST: f64 = 200.0;
+const LEAST: f32 = 0.05;
+const MOST: f32 = 200.0;
 /// What is so many times as bright as half of the picture may have larger errors: they are seen no better, and a
 /// lamp's edge would get all samples.
-const BRIGHT: f64 = 10.0;
+const BRIGHT: f32 = 10.0;
 
-/// Shares for [`Film::allot`]: where n samples leave an error of σ/n^a, with a = 0.75 for scrambled nets on
-/// penumbrae and edges, the mean squared error is least with n in proportion to σ^(1/(a + ½)).
-///
-/// Half the difference of the two halves stands for the error. A pixel that lacks one (all its samples may have
-/// been dropped) says nothing.
+/// Pixels of the other colour: those beside, and for what few samples have missed some farther ones, which count less.
+const NEAR: [(i32, i32); 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
+const FAR: [(i32, i32); 12] = [
+    (-3, 0),
+    (3, 0),
+    (0, -3),
+    (0, 3),
+    (-2, -1),
+    (-2, 1),
+    (2, -1),
+    (2, 1),
+    (-1, -2),
+    (-1, 2),
+    (1, -2),
+    (1, 2),
+];
+/// What the noise of a far one counts beside that of a near one.
+const FAR_NOISE: f32 = 0.1;
+/// What a step between two near ones counts beside noise, squared: an edge goes through the pixel, perhaps just so that both
+/// halves agree. As measured, like the others.
+const EDGE: f32 = 0.06;
+/// What a step between far ones counts beside one between near ones, squared.
+const FAR_EDGE: f32 = 0.05;
+/// Of the squared error: where n samples leave an error of σ/n^a, with a = 0.75 for scrambled nets on penumbrae and edges, the
+/// mean squared error is least with n in proportion to σ^(1/(a + ½)).
+const POWER: f32 = 0.4;
+
+/// Shares for [`Film::allot_first`], about one sample per pixel: where pixels differ there is an edge, or noise. Most get none.
 #[must_use]
-pub fn shares(film: &Film) -> Vec<f32> {
-    let [width, height] = film.size().to_array().map(|n| n as usize);
-    let mut variances = vec![0.0; width * height];
-    let mut means = vec![DVec3::ZERO; width * height];
-    for y in 0..height {
-        for (x, pixel) in film.row(y as u32).enumerate() {
-            if let Some((a, b)) = pixel.half_mean(0).zip(pixel.half_mean(1)) {
-                variances[y * width + x] = (a - b).length_squared();
-                means[y * width + x] = pixel.mean();
-            }
-        }
-    }
-    let brightness: Vec<f64> = means.iter().map(|mean| f64::from(luminance(mean.as_vec3()))).collect();
-    let mut sorted = brightness.clone();
-    let middle = sorted.len() / 2;
-    let bright = BRIGHT * *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    if bright > 0.0 {
-        for ((variance, mean), light) in variances.iter_mut().zip(&mut means).zip(&brightness) {
-            let dimmed = (light / bright).powi(2) + 1.0;
-            *variance /= dimmed;
-            *mean /= dimmed.sqrt();
-        }
-    }
-    let wanted: Vec<f64> = (0..width * height)
-        .map(|i| {
-            let (x, y) = ((i % width) as i64, (i / width) as i64);
-            let (mut sum, mut weights) = (0.0, 0.0);
-            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            for (dx, dy, weight) in AROUND {
-                let (x, y) = (x + dx, y + dy);
-                if (0..width as i64).contains(&x) && (0..height as i64).contains(&y) {
-                    let other = y as usize * width + x as usize;
-                    sum += weight * variances[other];
-                    weights += weight;
-                    if weight == 1.0 {
-                        (low, high) = (low.min(means[other]), high.max(means[other]));
-                    }
-                }
-            }
-            // A picture of one pixel has no others.
-            if weights == 0.0 {
-                return 1.0;
-            }
-            (sum / weights + EDGE * (high - low).length_squared()).powf(0.4)
-        })
-        .collect();
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let average = mean(&wanted);
-    if !(average > 0.0 && average.is_finite()) {
-        return vec![1.0; wanted.len()];
-    }
-    let clamped: Vec<f64> = wanted.iter().map(|w| (w / average).clamp(LEAST, MOST)).collect();
-    let average = mean(&clamped);
-    clamped.iter().map(|w| (w / average) as f32).collect()
+pub fn first_shares(film: &Film) -> Vec<f32> {
+    let seen = Seen::of(film);
+    let wanted = seen.each(|x, y| {
+        let [near, far] = [seen.around(&NEAR, x, y), seen.around(&FAR, x, y)];
+        (near.step + FAR_EDGE * far.step).powf(POWER)
+    });
+    shared_out(wanted, 0.0).into_iter().map(f32::round).collect()
 }
 
-/// Pixels of the other colour, near ones and, for what few samples have missed, some farther ones; and what each counts.
-const AROUND: [(i64, i64, f64); 16] = [
-    (-1, 0, 1.0),
-    (1, 0, 1.0),
-    (0, -1, 1.0),
-    (0, 1, 1.0),
-    (-3, 0, FAR),
-    (3, 0, FAR),
-    (0, -3, FAR),
-    (0, 3, FAR),
-    (-2, -1, FAR),
-    (-2, 1, FAR),
-    (2, -1, FAR),
-    (2, 1, FAR),
-    (-1, -2, FAR),
-    (-1, 2, FAR),
-    (1, -2, FAR),
-    (1, 2, FAR),
-];
-const FAR: f64 = 0.1;
-/// What a step between two neighbours counts, squared: an edge goes through the pixel, perhaps just so that both halves
-/// agree. As measured, like the two above.
-const EDGE: f64 = 0.06;
+/// Shares for [`Film::allot`]. Half the difference of the two halves stands for the error.
+#[must_use]
+pub fn shares(film: &Film) -> Vec<f32> {
+    let seen = Seen::of(film);
+    let wanted = seen.each(|x, y| {
+        let [near, far] = [seen.around(&NEAR, x, y), seen.around(&FAR, x, y)];
+        let count = near.count + FAR_NOISE * far.count;
+        // A picture of one pixel has no others.
+        if count == 0.0 {
+            return 1.0;
+        }
+        ((near.noise + FAR_NOISE * far.noise) / count + EDGE * near.step).powf(POWER)
+    });
+    shared_out(wanted, LEAST)
+}
+
+/// These numbers, so that they are 1 on average, and none of them far off.
+fn shared_out(mut wanted: Vec<f32>, least: f32) -> Vec<f32> {
+    let mean =
+        |values: &[f32]| values.iter().map(|v| f64::from(*v)).sum::<f64>() as f32 / values.len() as f32;
+    let average = mean(&wanted);
+    if !(average > 0.0 && average.is_finite()) {
+        wanted.fill(1.0);
+        return wanted;
+    }
+    wanted.iter_mut().for_each(|w| *w = (*w / average).clamp(least, MOST));
+    let average = mean(&wanted);
+    wanted.iter_mut().for_each(|w| *w /= average);
+    wanted
+}
+
+/// What the first few samples of a picture say.
+struct Seen {
+    size: UVec2,
+    /// Of each pixel, rows from the top: its mean, and the squared difference of the two halves. One that lacks one (all its
+    /// samples may have been dropped) says nothing.
+    cells: Vec<Vec4>,
+}
+
+/// What some pixels say together.
+struct Around {
+    /// How many there are.
+    count: f32,
+    /// The sum of their squared differences of halves.
+    noise: f32,
+    /// The square of how far their means are apart.
+    step: f32,
+}
+
+impl Seen {
+    fn of(film: &Film) -> Self {
+        let mut cells: Vec<Vec4> = film
+            .early()
+            .map(|(halves, mean)| mean.extend(halves.map_or(0.0, |[a, b]| (a - b).length_squared())))
+            .collect();
+        let light: Vec<f32> = cells.iter().map(|cell| luminance(cell.truncate())).collect();
+        let mut sorted = light.clone();
+        let middle = sorted.len() / 2;
+        let bright = BRIGHT * *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        if bright > 0.0 {
+            for (cell, light) in cells.iter_mut().zip(&light) {
+                let dimmed = (light / bright).powi(2) + 1.0;
+                *cell = (cell.truncate() / dimmed.sqrt()).extend(cell.w / dimmed);
+            }
+        }
+        Self { size: film.size(), cells }
+    }
+
+    fn each(&self, of: impl Fn(u32, u32) -> f32) -> Vec<f32> {
+        (0..self.size.y).flat_map(|y| (0..self.size.x).map(move |x| (x, y))).map(|(x, y)| of(x, y)).collect()
+    }
+
+    /// What those around a pixel say that are in the picture.
+    #[inline]
+    fn around(&self, offsets: &[(i32, i32)], x: u32, y: u32) -> Around {
+        let (mut low, mut high, mut sum) = (Vec4::INFINITY, Vec4::NEG_INFINITY, Vec4::ZERO);
+        for &(dx, dy) in offsets {
+            let (x, y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
+            if x < self.size.x && y < self.size.y {
+                let cell = self.cells[(y * self.size.x + x) as usize];
+                (low, high) = (low.min(cell), high.max(cell));
+                sum += cell.with_x(1.0);
+            }
+        }
+        let step = (high - low).max(Vec4::ZERO).truncate().length_squared();
+        Around { count: sum.x, noise: sum.w, step }
+    }
+}

@@ -122,8 +122,7 @@ impl Batch {
             None => (diffuse + glossy) / chance,
             Some(pdf) => {
                 let light_pdf = pdf * chance;
-                let is_met = scene.lights.get(light).is_met();
-                let shared = if is_met { power_heuristic(light_pdf, bounce_pdf) } else { 1.0 };
+                let shared = power_heuristic(light_pdf, bounce_pdf);
                 // What no bounce would find is the light samples' alone.
                 (diffuse * if followed.diffuse { shared } else { 1.0 } + glossy * shared) / light_pdf
             }

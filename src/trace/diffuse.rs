@@ -293,10 +293,8 @@ impl Batch {
             Some(pdf) => {
                 let light_pdf = pdf * chance;
                 let shared = match scene.settings.integrator {
-                    Integrator::Path if scene.lights.get(light).is_met() => {
-                        power_heuristic(light_pdf, cosine / PI)
-                    }
-                    _ => 1.0,
+                    Integrator::Path => power_heuristic(light_pdf, cosine / PI),
+                    Integrator::Direct => 1.0,
                 };
                 cosine * shared / (PI * light_pdf)
             }

@@ -12,6 +12,7 @@ use super::diffuse::Diffuse;
 use super::film::Tile;
 use super::light::FlatLight;
 use super::light_tree::Receiver;
+use super::lights::LightHit;
 use super::pass::RayCounts;
 use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
@@ -52,7 +53,7 @@ pub(super) struct Bounce {
 /// Which samples a tile is to get.
 #[derive(Clone, Copy, Debug)]
 pub enum Work {
-    /// All pixels those below index `until`.
+    /// All pixels those below index `until`, as far as they do not have them.
     Even {
         /// The first that is not to be taken.
         until: u32,
@@ -127,16 +128,21 @@ impl Batch {
                 self.keys.extend(own.map(|i| (i, tile.next_sample)));
             }
             Work::Half => {}
-            Work::Even { until } => {
+            Work::Even { until } if tile.more.is_empty() => {
                 let first = tile.next_sample;
                 let count = until.saturating_sub(first).min((TOGETHER / pixels).max(1));
                 self.keys
                     .extend((0..pixels).flat_map(|i| (first..first + count).map(move |sample| (i, sample))));
             }
-            Work::Shares { beyond } => {
+            Work::Even { .. } | Work::Shares { .. } => {
                 for (i, &more) in (0..pixels).zip(&tile.more) {
                     let room = TOGETHER - self.keys.len() as u32;
-                    let count = tile.goal(i as usize, beyond).saturating_sub(more).min(room);
+                    let goal = match work {
+                        Work::Shares { beyond } => tile.goal(i as usize, beyond),
+                        Work::Even { until } => until - tile.next_sample,
+                        Work::Half => 0,
+                    };
+                    let count = goal.saturating_sub(more).min(room);
                     let first = tile.next_sample + more;
                     self.keys.extend((first..first + count).map(|sample| (i, sample)));
                 }
@@ -174,11 +180,10 @@ impl Batch {
         rays.shadow += self.share(scene);
         self.diffuse.leave(tile);
         let mut dropped = 0;
-        let pixels = tile.pixels_mut();
         let mut done = 0;
         for run in self.keys.chunk_by(|a, b| a.0 == b.0) {
             let samples = run.iter().zip(&self.radiance[done..]).map(|(key, radiance)| (key.1, *radiance));
-            dropped += pixels[run[0].0 as usize].add_all(samples);
+            dropped += tile.add(run[0].0 as usize, samples);
             done += run.len();
         }
         tile.dropped += dropped;
@@ -188,8 +193,10 @@ impl Batch {
                 tile.half = false;
                 tile.next_sample += 1;
             }
-            Work::Even { .. } => tile.next_sample += (self.keys.len() / self.pixels.len()) as u32,
-            Work::Shares { .. } => {
+            Work::Even { .. } if tile.more.is_empty() => {
+                tile.next_sample += (self.keys.len() / self.pixels.len()) as u32;
+            }
+            Work::Even { .. } | Work::Shares { .. } => {
                 for key in &self.keys {
                     tile.more[key.0 as usize] += 1;
                 }
@@ -270,7 +277,16 @@ impl Batch {
         let path = &path;
         let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
         let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
-        if let Some(found) = may_meet.then(|| scene.lights.closest(&before_hit)).flatten() {
+        let found = may_meet.then(|| scene.lights.closest(&before_hit)).flatten();
+        // A bounce finds also those that only shine; the eye and mirrors do not see them.
+        if let Some(bounce) = path.bounce {
+            let on_the_way = Ray { t_max: found.map_or(before_hit.t_max, |found| found.hit.t), ..path.ray };
+            scene.lights.unseen_on(&on_the_way, |LightHit { light, shape, hit }| {
+                let (radiance, normal) = (shape.emitted(&path.ray, &hit), bounce.from.normal);
+                self.collect(scene, path, light, radiance, shape.pdf(&path.ray, normal, &hit));
+            });
+        }
+        if let Some(found) = found {
             let radiance = found.shape.emitted(&path.ray, &found.hit);
             let pdf =
                 path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.from.normal, &found.hit));

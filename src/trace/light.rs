@@ -107,12 +107,6 @@ impl FlatLight {
             && !matches!(self, Self::Directional { sin2_radius, .. } if *sin2_radius == 0.0)
     }
 
-    /// Whether rays run into it: if not, all of its light is that of light samples.
-    #[must_use]
-    pub fn is_met(&self) -> bool {
-        !matches!(self, Self::Shape(shape) if !shape.visible)
-    }
-
     /// A direction toward the light from `point` with unit normal `normal`. `None` where it is dark.
     #[must_use]
     pub fn sample(&self, point: Vec3, normal: Vec3, u: Vec2) -> Option<LightSample> {

@@ -22,13 +22,34 @@ pub struct Lights {
     places: Vec<u32>,
     /// Those that are nowhere: suns and skies.
     unplaced: Vec<u32>,
-    /// Solid shapes: a hierarchy over them and their numbers in `lights`.
-    shapes: Bvh,
-    shape_lights: Vec<u32>,
+    /// Solid shapes that rays end at.
+    seen: Shapes,
+    /// Those that only shine: rays go through them.
+    unseen: Shapes,
     /// Lights beyond the scene.
     beyond: Vec<u32>,
     /// (instance, material slot) → light, sorted.
     meshes: Vec<((u32, u16), u32)>,
+}
+
+/// Some of the solid shapes: a hierarchy over them, and their numbers among all lights.
+#[derive(Clone, Debug, Default)]
+struct Shapes {
+    hierarchy: Bvh,
+    lights: Vec<u32>,
+}
+
+impl Shapes {
+    fn of(lights: &[FlatLight], visible: bool) -> Self {
+        let (numbers, boxes): (Vec<u32>, Vec<Aabb>) = (0..)
+            .zip(lights)
+            .filter_map(|(i, light)| match light {
+                FlatLight::Shape(light) if light.visible == visible => Some((i, light.shape.bounds())),
+                _ => None,
+            })
+            .unzip();
+        Self { hierarchy: Bvh::build(&boxes), lights: numbers }
+    }
 }
 
 /// A light picked for sampling, and how often.
@@ -80,24 +101,17 @@ impl Lights {
             Some(before) if before.emitters == emitters => Arc::clone(&before.tree),
             _ => Arc::new(LightTree::new(&emitters)),
         };
-        let numbered = || lights.iter().zip(0u32..);
-        let solid: Vec<(u32, Aabb)> = numbered()
-            .filter_map(|(l, i)| match l {
-                FlatLight::Shape(s) if s.visible => Some((i, s.shape.bounds())),
-                _ => None,
-            })
-            .collect();
-        let shapes = Bvh::build(&solid.iter().map(|(_, aabb)| *aabb).collect::<Vec<_>>());
-        let shape_lights = solid.iter().map(|(i, _)| *i).collect();
-        let beyond = numbered()
-            .filter(|(l, _)| match l {
+        let [seen, unseen] = [true, false].map(|visible| Shapes::of(&lights, visible));
+        let beyond = (0..)
+            .zip(&lights)
+            .filter(|(_, light)| match light {
                 FlatLight::Environment { .. } | FlatLight::Sky(_) => true,
                 FlatLight::Directional { sin2_radius, .. } => *sin2_radius > 0.0,
                 _ => false,
             })
-            .map(|(_, i)| i)
+            .map(|(i, _)| i)
             .collect();
-        Self { tree, emitters, placed, places, unplaced, shapes, shape_lights, beyond, meshes, lights }
+        Self { tree, emitters, placed, places, unplaced, seen, unseen, beyond, meshes, lights }
     }
 
     /// Light number `index`.
@@ -180,7 +194,7 @@ impl Lights {
     #[must_use]
     pub fn closest(&self, ray: &Ray) -> Option<LightHit<'_>> {
         let mut best: Option<LightHit> = None;
-        let _ = self.shapes_on::<()>(ray, |light, shape, t_max| {
+        let _ = self.shapes_on::<()>(&self.seen, ray, |light, shape, t_max| {
             if let Some(hit) = shape.intersect(&Ray { t_max, ..*ray }) {
                 // Of equally near ones the first wins, whatever the order of the search.
                 if best.is_none_or(|b| (hit.t, light) < (b.hit.t, b.light)) {
@@ -193,10 +207,20 @@ impl Lights {
         best
     }
 
+    /// Visits all shapes on the ray that only shine.
+    pub fn unseen_on<'a>(&'a self, ray: &Ray, mut visit: impl FnMut(LightHit<'a>)) {
+        let _ = self.shapes_on::<()>(&self.unseen, ray, |light, shape, t_max| {
+            if let Some(hit) = shape.intersect(ray) {
+                visit(LightHit { light, shape, hit });
+            }
+            ControlFlow::Continue(t_max)
+        });
+    }
+
     /// Whether a solid shape other than light number `except` is on the ray.
     #[must_use]
     pub fn blocks(&self, ray: &Ray, except: u32) -> bool {
-        self.shapes_on(ray, |light, shape, t_max| {
+        self.shapes_on(&self.seen, ray, |light, shape, t_max| {
             if light != except && shape.intersect(ray).is_some() {
                 ControlFlow::Break(())
             } else {
@@ -209,7 +233,7 @@ impl Lights {
     /// Whether surely no solid shape other than light number `except` is in the way within `shaft`.
     #[must_use]
     pub fn is_clear(&self, shaft: &Shaft, except: u32) -> bool {
-        self.shape_lights.iter().all(|&light| match self.get(light) {
+        self.seen.lights.iter().all(|&light| match self.get(light) {
             FlatLight::Shape(shape) if light != except => shaft.misses_box(&shape.shape.bounds()),
             _ => true,
         })
@@ -218,7 +242,7 @@ impl Lights {
     /// Whether one of the boxes around solid shapes is such a one.
     #[must_use]
     pub fn any_shape(&self, is: impl Fn(Aabb) -> bool) -> bool {
-        self.shape_lights.iter().any(|&light| match self.get(light) {
+        self.seen.lights.iter().any(|&light| match self.get(light) {
             FlatLight::Shape(shape) => is(shape.shape.bounds()),
             _ => false,
         })
@@ -226,23 +250,24 @@ impl Lights {
 
     fn shapes_on<'a, B>(
         &'a self,
+        shapes: &'a Shapes,
         ray: &Ray,
         mut visit: impl FnMut(u32, &'a ShapeLight, f32) -> ControlFlow<B, f32>,
     ) -> ControlFlow<B> {
         // A few are tried faster than searched.
-        if self.shape_lights.len() <= FEW_SHAPES {
+        if shapes.lights.len() <= FEW_SHAPES {
             let mut t_max = ray.t_max;
-            for &light in &self.shape_lights {
+            for &light in &shapes.lights {
                 if let FlatLight::Shape(shape) = &self.lights[light as usize] {
                     t_max = visit(light, shape, t_max)?;
                 }
             }
             return ControlFlow::Continue(());
         }
-        let probe = Probe::new(ray, &self.shapes.bounds());
-        self.shapes.traverse(&probe, ray.t_max, |leaf, mut t_max| {
-            for &prim in &self.shapes.prims[leaf] {
-                let light = self.shape_lights[prim as usize];
+        let probe = Probe::new(ray, &shapes.hierarchy.bounds());
+        shapes.hierarchy.traverse(&probe, ray.t_max, |leaf, mut t_max| {
+            for &prim in &shapes.hierarchy.prims[leaf] {
+                let light = shapes.lights[prim as usize];
                 if let FlatLight::Shape(shape) = &self.lights[light as usize] {
                     t_max = visit(light, shape, t_max)?;
                 }

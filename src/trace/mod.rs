@@ -40,6 +40,6 @@ pub mod warp;
 pub use camera::Viewpoint;
 pub use film::Film;
 pub use lights::Lights;
-pub use pass::{RayCounts, trace_adaptive, trace_half, trace_pass};
+pub use pass::{RayCounts, hurry, trace_adaptive, trace_half, trace_pass};
 pub use scene::{Coverage, Geometry, Surfaces, TraceScene};
 pub use settings::{Integrator, RenderSettings, Sampling};

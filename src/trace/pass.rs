@@ -1,6 +1,6 @@
 //! Tiles over threads.
 
-use super::film::Tile;
+use super::film::{TILE, Tile};
 use super::integrator::{Batch, Work};
 use super::{Film, TraceScene, allot, reuse};
 use rayon::prelude::*;
@@ -43,25 +43,65 @@ pub fn trace_adaptive(
     step: u32,
     keep_going: impl Fn() -> bool + Sync,
 ) -> RayCounts {
+    if film.has_first_shares() {
+        return trace_first_shares(scene, film, until, keep_going);
+    }
     if film.is_allotted() {
         return trace_pass(scene, film, until, step, keep_going);
     }
     let rays = trace_pass(scene, film, until.min(allot::EVEN), step, keep_going);
-    if film.complete_samples() == allot::EVEN {
+    share_out(scene, film);
+    rays
+}
+
+/// Where there will be time for few samples only, lets the second of a film that has one of each pixel go where that one
+/// shows edges, or noise. (Some get many, most none; the third goes to those who then have fewer than [`allot::EVEN`].)
+pub fn hurry(scene: &TraceScene, film: &mut Film) {
+    // Those who share paths have as many samples, and their noise is everywhere.
+    if film.complete_samples() == 1 && !film.is_allotted() && !scene.settings.shares_paths() {
+        film.keep_early();
+        film.allot_first(&allot::first_shares(film));
+    }
+}
+
+/// Two samples per pixel as the very first ask for them, then [`allot::EVEN`] at least for each.
+fn trace_first_shares(
+    scene: &TraceScene,
+    film: &mut Film,
+    until: u32,
+    keep_going: impl Fn() -> bool + Sync,
+) -> RayCounts {
+    // Of all tiles, also those that rest: it does not take long.
+    let complete = |film: &Film| film.tiles().iter().map(|tile| tile.complete).min();
+    let mut rays = RayCounts::default();
+    if complete(film) == Some(1) {
+        rays = rays + trace_tiles(scene, film, Work::Shares { beyond: 1 }, 2, &keep_going);
+    }
+    if complete(film) == Some(2) && until > 2 {
+        let work = Work::Even { until: film.first_sample().saturating_add(allot::EVEN) };
+        rays = rays + trace_tiles(scene, film, work, allot::EVEN, &keep_going);
+    }
+    if film.end_first_shares() {
+        share_out(scene, film);
+    }
+    rays
+}
+
+/// Gives out shares, if it is time.
+fn share_out(scene: &TraceScene, film: &mut Film) {
+    if !film.is_allotted() && film.complete_samples() == allot::EVEN {
         let mut shares = allot::shares(film);
         if scene.settings.shares_paths() {
             reuse::even_out(&mut shares, film.size().x as usize);
         }
         film.allot(&shares);
     }
-    rays
 }
 
 /// Gives the pixels of one colour of the chess board their first sample, if none has any, as long as `keep_going`: where
 /// time is short half of the picture everywhere is more than the upper half of it.
 pub fn trace_half(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() -> bool + Sync) -> RayCounts {
     let (size, first) = (film.size(), film.first_sample());
-    let fresh = film.tiles_mut().par_iter_mut().filter(|tile| !tile.rests() && tile.next_sample == first);
     let look = |batch: &mut Batch, tile: &mut Tile| {
         let mut rays = RayCounts::default();
         // One pixel has no halves.
@@ -72,7 +112,28 @@ pub fn trace_half(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() -> 
         }
         rays
     };
-    fresh.map_init(Batch::default, look).reduce(RayCounts::default, |a, b| a + b)
+    let tiles = far_apart(film).into_par_iter().filter(|tile| tile.next_sample == first);
+    tiles.map_init(Batch::default, look).reduce(RayCounts::default, |a, b| a + b)
+}
+
+/// Tiles side by side that are worked on one after the other, as a power of two: what is near is at hand.
+const TOGETHER: u32 = 2;
+
+/// The tiles that are worked on. Before all have a sample, groups that come one after the other are far apart (by the bits of
+/// their place, reversed): what there is time for is of the whole picture.
+fn far_apart(film: &mut Film) -> Vec<&mut Tile> {
+    let (is_first, is_for_all) = (film.complete_samples() == 0, film.has_first_shares());
+    let mut tiles: Vec<&mut Tile> =
+        film.tiles_mut().iter_mut().filter(|tile| is_for_all || !tile.rests()).collect();
+    if is_first {
+        let spread =
+            |number: u32| (0..u32::BITS).map(|bit| u64::from(number >> bit & 1) << (2 * bit)).sum::<u64>();
+        tiles.sort_by_cached_key(|tile| {
+            let [x, y] = ((tile.origin / TILE) >> TOGETHER).to_array().map(spread);
+            (x | y << 1).reverse_bits()
+        });
+    }
+    tiles
 }
 
 /// Brings all tiles to their share of `until` samples per pixel, `step` samples at a time, as long as `keep_going`.
@@ -86,31 +147,34 @@ pub fn trace_pass(
     step: u32,
     keep_going: impl Fn() -> bool + Sync,
 ) -> RayCounts {
-    let size = film.size();
     let samples = film.complete_samples().saturating_add(step.max(1)).min(until);
-    let (allotted, first) = (film.is_allotted(), film.first_sample());
-    let beyond = samples.saturating_sub(film.even_samples());
-    film.tiles_mut()
-        .par_iter_mut()
-        .filter(|tile| !tile.rests())
-        .map_init(Batch::default, |batch, tile| {
-            let mut rays = RayCounts::default();
-            loop {
-                let work = if allotted {
-                    Work::Shares { beyond }
-                } else {
-                    Work::Even { until: first.saturating_add(samples) }
-                };
-                if !batch.begin(scene, tile, work) {
-                    tile.complete = samples;
-                    break;
-                }
-                if !keep_going() {
-                    break;
-                }
-                batch.render(scene, tile, size, &mut rays);
+    let work = if film.is_allotted() {
+        Work::Shares { beyond: samples.saturating_sub(film.even_samples()) }
+    } else {
+        Work::Even { until: film.first_sample().saturating_add(samples) }
+    };
+    trace_tiles(scene, film, work, samples, keep_going)
+}
+
+/// Does the work on all tiles, after which they have `samples`.
+fn trace_tiles(
+    scene: &TraceScene,
+    film: &mut Film,
+    work: Work,
+    samples: u32,
+    keep_going: impl Fn() -> bool + Sync,
+) -> RayCounts {
+    let size = film.size();
+    let trace = |batch: &mut Batch, tile: &mut Tile| {
+        let mut rays = RayCounts::default();
+        while batch.begin(scene, tile, work) {
+            if !keep_going() {
+                return rays;
             }
-            rays
-        })
-        .reduce(RayCounts::default, |a, b| a + b)
+            batch.render(scene, tile, size, &mut rays);
+        }
+        tile.complete = samples;
+        rays
+    };
+    far_apart(film).into_par_iter().map_init(Batch::default, trace).reduce(RayCounts::default, |a, b| a + b)
 }

@@ -59,7 +59,7 @@ pub(super) fn sample_quad(
 ) {
     let Shape::Parallelogram(quad) = &shape.shape else { return };
     let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
-    let shared = scene.settings.integrator == Integrator::Path && shape.visible;
+    let shared = scene.settings.integrator == Integrator::Path;
     scene.geometry.tlas.isa().run(SampleQuad {
         block,
         samplers,

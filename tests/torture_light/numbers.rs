@@ -191,7 +191,7 @@ fn stopping_early_is_found() {
         let pairs = reds(&all).into_iter().zip(reds(&few));
         let stopped = pairs.map(|(all, few)| if few == 0.0 { 0.0 } else { all });
         stopping.push(mean(&stopped.collect::<Vec<f64>>()));
-        fair.push(mean(&reds(&adaptively(&stage, seed, 16))));
+        fair.push(mean(&reds(&adaptively(&stage, seed, 16, false))));
     }
     finds("standard errors off", &bias("stopping", 1, &stopping, exact));
     let fair = bias("fair", 1, &fair, exact);

@@ -11,10 +11,12 @@ mod tile;
 pub use pixel::Pixel;
 pub use tile::Tile;
 
+use super::allot::EVEN;
 use super::sightlines::Sightlines;
 use bevy_ecs::prelude::*;
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use pixel::EMPTY;
+use tile::Early;
 
 /// Side of a tile in pixels.
 pub const TILE: u32 = 8;
@@ -26,6 +28,8 @@ pub struct Film {
     first_sample: u32,
     /// Samples of each pixel from which on [`Film::allot`] gives out shares; 0 if it does not.
     even_samples: u32,
+    /// See [`Film::allot_first`].
+    has_first_shares: bool,
     /// See [`Film::confine`].
     region: Option<[UVec2; 2]>,
     tiles: Vec<Tile>,
@@ -50,6 +54,7 @@ impl Film {
                     more: Vec::new(),
                     shares: Vec::new(),
                     complete: 0,
+                    early: Vec::new(),
                     dropped: 0,
                     rests: false,
                     stale: false,
@@ -58,14 +63,15 @@ impl Film {
                 }
             })
             .collect();
-        Self { size, first_sample, even_samples: 0, region: None, tiles }
+        Self { size, first_sample, even_samples: 0, has_first_shares: false, region: None, tiles }
     }
 
     /// Forgets all samples, in no time: a tile is cleared when it is next worked on.
     pub fn reset(&mut self) {
         let first_sample = self.first_sample;
-        self.even_samples = 0;
+        (self.even_samples, self.has_first_shares) = (0, false);
         for tile in &mut self.tiles {
+            tile.early.clear();
             tile.next_sample = first_sample;
             tile.half = false;
             tile.more.clear();
@@ -167,12 +173,69 @@ impl Film {
         })
     }
 
+    /// From now on keeps apart what the first [`EVEN`] samples of each pixel say, of which each has one: the later share of
+    /// another must not depend on how many this one had by then, since that was found from the other.
+    pub fn keep_early(&mut self) {
+        for tile in &mut self.tiles {
+            let early = tile.pixels().map(|pixel| Early::new(pixel, EVEN as u8 - 1)).collect();
+            tile.early = early;
+        }
+    }
+
+    /// Begins to give out shares, whole numbers of samples, after [`Film::keep_early`] by what that has kept. When
+    /// [`Film::end_first_shares`] ends it, each pixel has as many as it must have for [`Film::allot`].
+    pub fn allot_first(&mut self, shares: &[f32]) {
+        self.give_shares(shares);
+        self.has_first_shares = true;
+    }
+
+    /// Ends what [`Film::allot_first`] began, if all tiles have come so far, also those that rest now. Samples beyond are
+    /// counted toward what [`Film::allot`] gives out next.
+    pub fn end_first_shares(&mut self) -> bool {
+        if !self.tiles.iter().all(|tile| tile.complete == EVEN) {
+            return false;
+        }
+        (self.even_samples, self.has_first_shares) = (0, false);
+        for tile in &mut self.tiles {
+            tile.next_sample += EVEN - 1;
+            tile.more.iter_mut().for_each(|more| *more -= EVEN - 1);
+        }
+        true
+    }
+
+    /// Whether shares by the first sample of each pixel are being given out. Some pixels may have no other.
+    #[must_use]
+    pub fn has_first_shares(&self) -> bool {
+        self.has_first_shares
+    }
+
+    /// Means of both halves of each pixel, as far as they have samples, and of all; by the first [`EVEN`] samples if they are
+    /// known apart. Rows from the top.
+    pub(super) fn early(&self) -> impl Iterator<Item = (Option<[Vec3; 2]>, Vec3)> {
+        let across = self.size.x.div_ceil(TILE);
+        let places = (0..self.size.y).flat_map(|y| (0..self.size.x).map(move |x| (x, y)));
+        places.map(move |(x, y)| {
+            let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
+            if let Some(early) = tile.early.get((y % TILE * tile.size.x + x % TILE) as usize) {
+                return (early.halves(), early.mean());
+            }
+            let pixel = self.pixel(x, y);
+            let halves = pixel.half_mean(0).zip(pixel.half_mean(1));
+            (halves.map(|(a, b)| [a.as_vec3(), b.as_vec3()]), pixel.mean().as_vec3())
+        })
+    }
+
     /// From now on gives each pixel its own share of all samples, of mean 1; `shares` are in rows of the whole picture.
-    /// Every pixel must have the same number of samples, one at least.
+    /// Every pixel must have the same number of samples, one at least, but for those of [`Film::allot_first`].
     ///
     /// A picture stays unbiased only if how many samples a pixel gets does not depend on what they say: so
     /// the share of one pixel is to be found from others.
     pub fn allot(&mut self, shares: &[f32]) {
+        self.give_shares(shares);
+        self.tiles.iter_mut().for_each(|tile| tile.early = Vec::new());
+    }
+
+    fn give_shares(&mut self, shares: &[f32]) {
         self.even_samples = self.complete_samples();
         debug_assert!(!self.tiles.iter().any(Tile::is_half), "a half tile has no even number of samples");
         let across = self.size.x as usize;
@@ -181,7 +244,6 @@ impl Film {
                 [tile.origin.x, tile.origin.y, tile.size.x, tile.size.y].map(|n| n as usize);
             tile.shares.clear();
             tile.shares.extend((y..y + height).flat_map(|y| &shares[y * across + x..][..width]));
-            tile.more.clear();
             tile.more.resize(width * height, 0);
             tile.complete = self.even_samples;
         }

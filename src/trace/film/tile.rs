@@ -2,7 +2,7 @@
 
 use super::pixel::{EMPTY, Pixel};
 use crate::trace::sightlines::Sightlines;
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 
 /// A square of the film that one thread works on at a time.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +23,8 @@ pub struct Tile {
     pub(super) shares: Vec<f32>,
     /// Samples per pixel of the picture that all have their share of, if they have shares.
     pub(in crate::trace) complete: u32,
+    /// The first few samples of each pixel apart from the others, while shares are given out by the very first.
+    pub(super) early: Vec<Early>,
     /// Samples dropped because they were not finite (a defect elsewhere, shown to the user).
     pub dropped: u64,
     /// It gets no samples for now.
@@ -32,6 +34,46 @@ pub struct Tile {
     /// What is known of its part of the scene until the next reset.
     pub(in crate::trace) sightlines: Sightlines,
     pub(super) pixels: Vec<Pixel>,
+}
+
+/// Sums and numbers of the first few samples of a pixel, by halves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Early {
+    sums: [Vec3; 2],
+    counts: [u8; 2],
+    /// Samples that are still to come, dropped ones too.
+    missing: u8,
+}
+
+impl Early {
+    /// Of a pixel with its first sample, or without if it was dropped, and `missing` more to come.
+    pub(super) fn new(pixel: &Pixel, missing: u8) -> Self {
+        let sums = [0, 1].map(|half| pixel.half_mean(half).unwrap_or_default().as_vec3());
+        Self { sums, counts: pixel.counts().map(|count| count as u8), missing }
+    }
+
+    /// Means of both halves; `None` if one has no sample.
+    pub(super) fn halves(&self) -> Option<[Vec3; 2]> {
+        let mean = |half: usize| self.sums[half] / f32::from(self.counts[half]);
+        (self.counts[0] > 0 && self.counts[1] > 0).then(|| [mean(0), mean(1)])
+    }
+
+    /// Mean of all.
+    pub(super) fn mean(&self) -> Vec3 {
+        (self.sums[0] + self.sums[1]) / f32::from(self.counts[0] + self.counts[1]).max(1.0)
+    }
+
+    fn add_to(&mut self, pixel: &mut Pixel, index: u32, radiance: Vec3) -> bool {
+        let is_taken = pixel.add(index, radiance);
+        if let Some(missing) = self.missing.checked_sub(1) {
+            self.missing = missing;
+            if is_taken {
+                self.sums[index as usize & 1] += radiance;
+                self.counts[index as usize & 1] += 1;
+            }
+        }
+        is_taken
+    }
 }
 
 impl Tile {
@@ -58,6 +100,17 @@ impl Tile {
     #[must_use]
     pub fn next_of(&self, pixel: usize) -> u32 {
         self.next_sample + self.more.get(pixel).copied().unwrap_or(0)
+    }
+
+    /// Adds samples to pixel number `index` of its rows; returns how many were dropped.
+    pub(in crate::trace) fn add(&mut self, index: usize, samples: impl Iterator<Item = (u32, Vec3)>) -> u64 {
+        // Forgets what is from before the last reset.
+        self.pixels_mut();
+        let pixel = &mut self.pixels[index];
+        match self.early.get_mut(index) {
+            None => pixel.add_all(samples),
+            Some(early) => samples.map(|(at, radiance)| u64::from(!early.add_to(pixel, at, radiance))).sum(),
+        }
     }
 
     /// Rows from the top, to look at.
