@@ -205,7 +205,7 @@ fn highlights_of_a_lamp_that_only_shines_are_found_by_bounces() {
         let squares = one.iter().zip(&other).map(|(a, b)| (a - b).powi(2) / 2.0);
         let noise = (squares.sum::<f64>() / one.len() as f64).sqrt();
         println!("{}: {noise:.1e}", integrator.name());
-        // By light samples alone it is 0.14.
-        assert!(noise < 5e-3, "{noise}");
+        // By light samples alone it was 0.06 at least.
+        assert!(noise < 0.03, "{noise}");
     }
 }
