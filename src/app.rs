@@ -86,7 +86,8 @@ pub struct FrameStats {
     pub samples_per_pixel: f64,
     /// Whether the sample target is reached: another frame would do nothing.
     pub done: bool,
-    /// Estimated relative noise of the picture (0.02 = 2 %), from two samples per pixel on.
+    /// Estimated relative noise of the picture (0.02 = 2 %), from two samples per pixel on, or three where time
+    /// is short.
     pub noise: Option<f64>,
     /// How well it is known: see [`noise::Noise::doubt`].
     pub noise_doubt: f64,

@@ -190,3 +190,22 @@ fn a_hurry_ends_also_where_only_a_part_is_refined() {
     film.reset();
     assert!(!film.has_first_shares() && !film.is_allotted());
 }
+
+#[test]
+fn a_second_pass_that_has_begun_is_no_time_for_a_hurry() {
+    let stage = edge(40);
+    let scene = stage.scene();
+    let mut film = Film::new(scene.settings.size, 0);
+    trace_pass(&scene, &mut film, 1, 1, || true);
+    let asked = AtomicU32::new(0);
+    trace_pass(&scene, &mut film, 2, 1, || asked.fetch_add(1, Ordering::Relaxed) < 7);
+    assert_eq!(film.complete_samples(), 1);
+    hurry(&scene, &mut film);
+    assert!(!film.has_first_shares());
+    // Nor is one in which only a part is refined.
+    let mut film = Film::new(scene.settings.size, 0);
+    film.confine(Some([UVec2::splat(8), UVec2::splat(16)]));
+    trace_pass(&scene, &mut film, 1, 1, || true);
+    hurry(&scene, &mut film);
+    assert!(!film.has_first_shares());
+}

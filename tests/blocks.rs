@@ -6,7 +6,7 @@ mod stage;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 use penumbra::bvh::{Isa, Ray};
-use penumbra::scene::{Glossy, Light, Material, Visible};
+use penumbra::scene::{Body, Glossy, Layers, Light, Material, Transmission, Visible};
 use penumbra::trace::block::{Block, LANES, Placed};
 use penumbra::trace::sampler::{Sampler, SamplerRow};
 use penumbra::trace::surface::Interaction;
@@ -208,4 +208,28 @@ fn highlights_of_a_lamp_that_only_shines_are_found_by_bounces() {
         // By light samples alone it was 0.06 at least.
         assert!(noise < 0.03, "{noise}");
     }
+}
+
+/// A lamp that only shines, beside a floor and below the surface of a body that absorbs: all is seen from above.
+#[test]
+fn a_lamp_in_a_body_that_absorbs_is_as_bright_by_bounces_as_by_light_samples() {
+    let body = Transmission { factor: 1.0, texture: None, body: Some(Body { absorption: Vec3::splat(0.7) }) };
+    let layers = Layers { ior: 1.0, transmission: Some(body), ..Layers::default() };
+    let glossy = Glossy::Ggx { metallic: 0.0, roughness: 0.0, texture: None };
+    let surface = Material { glossy, layers: Some(Box::new(layers)), ..Material::lambert(Vec3::ONE) };
+    let [few, many] = [1, 6].map(|light_samples| {
+        let mut stage = Stage::new(RenderSettings { light_samples, ..settings(16, 16, Integrator::Path, 2) });
+        let corner = Vec3::new(-4.0, -4.0, 0.0);
+        let floor = Material { double_sided: true, ..Material::lambert(Vec3::splat(0.5)) };
+        stage.add_mesh(quad(corner, Vec3::X * 8.0, Vec3::Y * 8.0), floor, DAffine3::IDENTITY);
+        let above = quad(corner + Vec3::Z * 3.0, Vec3::X * 8.0, Vec3::Y * 8.0);
+        stage.add_mesh(above, surface.clone(), DAffine3::IDENTITY);
+        let lamp = Light::Disk { radius: 1.0, radiance: Vec3::splat(9.0), two_sided: true };
+        let lamp = stage.add(lamp, DAffine3::from_translation(DVec3::Z));
+        stage.app.world.entity_mut(lamp).insert(Visible(false));
+        stage.look(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, 1.0);
+        Estimate::of(&reds(&stage.expose(1024, || true).0))
+    });
+    println!("{few:?} {many:?}");
+    assert!(few.mean > 0.05 && (few.mean / many.mean - 1.0).abs() < 3e-3, "{few:?} {many:?}");
 }

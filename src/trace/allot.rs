@@ -10,7 +10,7 @@ use glam::{UVec2, Vec4};
 
 /// Even samples per pixel before shares are given out.
 pub const EVEN: u32 = 3;
-/// Nobody gets less than this share, or more than that many: what the first samples have missed must have its
+/// Nobody gets less than this share for good, or ever more than that many: what the first samples have missed must have its
 /// chance.
 const LEAST: f32 = 0.05;
 const MOST: f32 = 200.0;
@@ -90,8 +90,8 @@ fn shared_out(mut wanted: Vec<f32>, least: f32) -> Vec<f32> {
 /// What the first few samples of a picture say.
 struct Seen {
     size: UVec2,
-    /// Of each pixel, rows from the top: its mean, and the squared difference of the two halves. One that lacks one (all its
-    /// samples may have been dropped) says nothing.
+    /// Of each pixel, rows from the top: its mean, and the squared difference of the two halves. One that lacks one (it has a
+    /// single sample, or all of that half were dropped) says nothing of noise.
     cells: Vec<Vec4>,
 }
 

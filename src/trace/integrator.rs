@@ -40,6 +40,16 @@ pub(super) struct Path {
     pub(super) absorption: Vec3,
 }
 
+impl Path {
+    /// With what is left where its ray has come to `t`.
+    fn after(mut self, t: f32) -> Self {
+        if self.absorption != Vec3::ZERO {
+            self.throughput *= passed(self.absorption, t * self.ray.direction.length());
+        }
+        self
+    }
+}
+
 /// The smooth bounce that a ray comes from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounce {
@@ -104,6 +114,8 @@ pub(super) const LOBE: u32 = 1;
 pub(super) const DIRECTION: u32 = 2;
 pub(super) const PICK: u32 = 3;
 pub(super) const LIGHT: u32 = 4;
+/// What is farther than a surface by no more than that is where it is: a lamp may lie in the plane of a ceiling.
+const SAME_PLACE: f32 = 1.0 + 4e-6;
 /// From this depth on a path may end by chance.
 pub(super) const ROULETTE_DEPTH: u32 = 4;
 
@@ -270,29 +282,20 @@ impl Batch {
 
     /// What the end of a path's ray sends back along it, and where it goes on.
     fn arrive(&mut self, scene: &TraceScene, index: usize) {
-        let (mut path, hit) = (self.path(index), self.hits[index]);
-        if let (true, Some(hit)) = (path.absorption != Vec3::ZERO, hit) {
-            path.throughput *= passed(path.absorption, hit.t * path.ray.direction.length());
-        }
-        let path = &path;
-        let before_hit = Ray { t_max: hit.map_or(path.ray.t_max, |h| h.t), ..path.ray };
+        let (path, hit) = (self.path(index), self.hits[index]);
+        let reach = hit.map_or(path.ray.t_max, |hit| hit.t * SAME_PLACE);
         let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
-        let found = may_meet.then(|| scene.lights.closest(&before_hit)).flatten();
+        let found = may_meet.then(|| scene.lights.closest(&Ray { t_max: reach, ..path.ray })).flatten();
         // A bounce finds also those that only shine; the eye and mirrors do not see them.
-        if let Some(bounce) = path.bounce {
-            let on_the_way = Ray { t_max: found.map_or(before_hit.t_max, |found| found.hit.t), ..path.ray };
-            scene.lights.unseen_on(&on_the_way, |LightHit { light, shape, hit }| {
-                let (radiance, normal) = (shape.emitted(&path.ray, &hit), bounce.from.normal);
-                self.collect(scene, path, light, radiance, shape.pdf(&path.ray, normal, &hit));
-            });
+        if path.bounce.is_some() {
+            let on_the_way = Ray { t_max: found.map_or(reach, |found| found.hit.t), ..path.ray };
+            scene.lights.unseen_on(&on_the_way, |passed| self.meet(scene, &path, &passed));
         }
         if let Some(found) = found {
-            let radiance = found.shape.emitted(&path.ray, &found.hit);
-            let pdf =
-                path.bounce.map_or(0.0, |bounce| found.shape.pdf(&path.ray, bounce.from.normal, &found.hit));
-            self.collect(scene, path, found.light, radiance, pdf);
+            self.meet(scene, &path, &found);
             return;
         }
+        let path = &hit.map_or(path, |hit| path.after(hit.t));
         let Some(hit) = hit else {
             let normal = path.bounce.map_or(Vec3::Z, |b| b.from.normal);
             for (light, beyond) in scene.lights.beyond() {
@@ -341,6 +344,13 @@ impl Batch {
         if !path.last && path.depth < scene.settings.max_depth {
             self.scatter(scene, path, surface, &at);
         }
+    }
+
+    /// Adds the light of a shape that a ray ran into.
+    fn meet(&mut self, scene: &TraceScene, path: &Path, LightHit { light, shape, hit }: &LightHit<'_>) {
+        let radiance = shape.emitted(&path.ray, hit);
+        let pdf = path.bounce.map_or(0.0, |bounce| shape.pdf(&path.ray, bounce.from.normal, hit));
+        self.collect(scene, &path.after(hit.t), *light, radiance, pdf);
     }
 
     /// Adds light that a ray ran into, weighted against the chance of having sampled it.

@@ -58,7 +58,7 @@ pub fn trace_adaptive(
 /// shows edges, or noise. (Some get many, most none; the third goes to those who then have fewer than [`allot::EVEN`].)
 pub fn hurry(scene: &TraceScene, film: &mut Film) {
     // Those who share paths have as many samples, and their noise is everywhere.
-    if film.complete_samples() == 1 && !film.is_allotted() && !scene.settings.shares_paths() {
+    if film.has_one_each() && !scene.settings.shares_paths() {
         film.keep_early();
         film.allot_first(&allot::first_shares(film));
     }

@@ -9,7 +9,7 @@ use crate::scene::{Encoding, Filter, NormalMap, Texels, Texture, TextureUse, Wra
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec2};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 /// A texture statement: options, then a file name that may have spaces.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,8 +96,8 @@ fn statement<'m>(material: &'m tobj::Material, keyword: &str) -> Option<&'m str>
     known.as_deref()
 }
 
-/// What stands between the folder of a library and the name that it gives.
-const BESIDE: &str = "//";
+/// What stands between the folder of a library and the name that it gives: no file has it in its text.
+const BESIDE: &str = "\0";
 
 /// The same statement as the scene's folder sees it: names in a library count from the library's folder.
 pub(super) fn beside(library: &str, statement: &str) -> String {
@@ -123,6 +123,8 @@ fn read(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
 /// Decoded images of a library by file name.
 pub(super) struct Textures {
     images: BTreeMap<String, Arc<Texels>>,
+    /// Names of those that could not be read.
+    missing: BTreeSet<String>,
     spawned: BTreeMap<Key, Entity>,
 }
 
@@ -147,9 +149,16 @@ impl Textures {
                 });
             }
         }
+        let unread = pictures.iter().filter(|(_, picture)| picture.bytes.is_err());
+        let missing = unread.map(|(name, _)| name.clone()).collect();
         let (names, pictures): (Vec<String>, Vec<Picture<'_>>) = pictures.into_iter().unzip();
         let texels = picture::decode_all(file, &pictures, sink);
-        Self { images: names.into_iter().zip(texels).collect(), spawned: BTreeMap::new() }
+        Self { images: names.into_iter().zip(texels).collect(), missing, spawned: BTreeMap::new() }
+    }
+
+    /// Whether the material has such a statement, and its picture is there.
+    pub(super) fn has(&self, material: &tobj::Material, keyword: &str) -> bool {
+        statement(material, keyword).is_some_and(|map| !self.missing.contains(Map::parse(map).name))
     }
 
     /// `map_Kd` with the alpha of `map_d`.

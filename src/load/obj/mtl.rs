@@ -59,7 +59,7 @@ pub(super) fn spawn_all(
 }
 
 /// More than any scene has: each costs a look into the folder.
-const MOST_LIBRARIES: usize = 256;
+const MOST_LIBRARIES: usize = 1024;
 /// Most words of a name with spaces.
 const MOST_WORDS: usize = 8;
 
@@ -76,7 +76,7 @@ fn libraries_of<'a>(folder: &'a Folder, statement: &str) -> impl Iterator<Item =
         }
         let rest = words.get(first..).filter(|rest| !rest.is_empty())?;
         let most = rest.len().min(MOST_WORDS);
-        let there = (2..=most).rev().find(|&count| folder.has(&rest[..count].join(" ")));
+        let there = (1..=most).rev().find(|&count| folder.has(&rest[..count].join(" ")));
         let is_end = |&count: &usize| rest[count - 1].to_ascii_lowercase().ends_with(".mtl");
         let count = there.or_else(|| (1..=most).find(is_end)).unwrap_or(1);
         first += count;
@@ -191,8 +191,8 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let mut specular = unit(material.specular.map_or(Vec3::ZERO, Vec3::from));
     let tint = unit(color(material, "Tf").unwrap_or(Vec3::ONE));
     let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
-    // A map alone is the value itself.
-    let unsaid = if is_mapped("map_Ke") { Vec3::ONE } else { Vec3::ZERO };
+    // A map alone is the value itself; what stands in for one that is not there is no lamp.
+    let unsaid = if textures.has(material, "map_Ke") { Vec3::ONE } else { Vec3::ZERO };
     let emission = material.emissive.map_or(unsaid, Vec3::from).max(Vec3::ZERO);
     let exponent = within(material.shininess.unwrap_or(0.0), 0.0, 1e6);
     let opacity = material

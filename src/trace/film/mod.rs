@@ -173,6 +173,13 @@ impl Film {
         })
     }
 
+    /// Whether it has the first sample of each pixel, also where nothing is refined now, and no other.
+    #[must_use]
+    pub fn has_one_each(&self) -> bool {
+        let of = |tile: &Tile| tile.next_sample.checked_sub(self.first_sample) == Some(1) && !tile.half;
+        !self.is_allotted() && self.region.is_none() && self.tiles.iter().all(of)
+    }
+
     /// From now on keeps apart what the first [`EVEN`] samples of each pixel say, of which each has one: the later share of
     /// another must not depend on how many this one had by then, since that was found from the other.
     pub fn keep_early(&mut self) {
@@ -249,7 +256,7 @@ impl Film {
         }
     }
 
-    /// Whether [`Film::allot`] has given out shares.
+    /// Whether shares have been given out, be it first ones.
     #[must_use]
     pub fn is_allotted(&self) -> bool {
         self.even_samples > 0

@@ -17,7 +17,7 @@ pub struct Tile {
     ///
     /// [`trace_half`]: crate::trace::pass::trace_half
     pub(in crate::trace) half: bool,
-    /// Samples beyond `next_sample` that each pixel has, in rows from the top. Empty before [`Film::allot`].
+    /// Samples beyond `next_sample` that each pixel has, in rows from the top. Empty before shares are given out.
     pub(in crate::trace) more: Vec<u32>,
     /// How many each gets for each one that the picture gets on average; as many.
     pub(super) shares: Vec<f32>,
