@@ -228,7 +228,7 @@ fn is_worth_developing(budget: Res<FrameBudget>, stats: Res<FrameStats>) -> bool
 }
 
 /// Time for fewer samples than that is short.
-const FEW_SAMPLES: f64 = 5.0;
+const FEW_SAMPLES: f64 = 3.0;
 
 /// How many times as long as an estimate of the noise takes is traced before the next, unless it is asked for.
 const ESTIMATE: f64 = 12.0;

@@ -39,35 +39,43 @@ impl Shaft {
     /// From one flat piece, the convex hull of its corners, to another.
     #[must_use]
     pub fn new(from: &[DVec3], to: &[DVec3]) -> Self {
-        Self::around([from, to].concat(), from.len())
+        let corners = [from, to].concat();
+        let mut normals = Vec::with_capacity(24);
+        for axis in 0..3 {
+            outline(&corners, axis, |normal| normals.push(normal));
+        }
+        Self::bounded(corners, from.len(), normals.into_iter())
     }
 
-    fn around(corners: Vec<DVec3>, first: usize) -> Self {
+    /// Of these corners, with planes of these normals around them.
+    fn bounded(corners: Vec<DVec3>, first: usize, normals: impl Iterator<Item = DVec3>) -> Self {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in &corners {
             (low, high) = (low.min(*p), high.max(*p));
         }
-        let reach = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let reach = low.abs().max(high.abs()).max_element();
         let margin = MARGIN * reach;
         let bounds = Aabb {
             min: (low - margin).as_vec3().map(f32::next_down),
             max: (high + margin).as_vec3().map(f32::next_up),
         };
-        let mut planes = Vec::with_capacity(24);
-        for axis in 0..3 {
-            outline(&corners, axis, |normal| {
-                let most = corners.iter().map(|p| normal.dot(*p)).fold(f64::NEG_INFINITY, f64::max);
-                planes.push((normal, most + margin * normal.abs().element_sum()));
-            });
-        }
+        let plane = |normal: DVec3| {
+            let most = corners.iter().map(|p| normal.dot(*p)).fold(f64::NEG_INFINITY, f64::max);
+            (normal, most + margin * normal.abs().element_sum())
+        };
+        let planes: Vec<(DVec3, f64)> = normals.map(plane).collect();
         let coarse =
             planes.iter().map(|(normal, most)| (normal.as_vec3().to_array(), (*most as f32).next_up()));
         let coarse = coarse.collect();
         Self { corners, first, bounds, reach, planes, coarse }
     }
 
-    fn moved(&self, by: &DAffine3) -> Self {
-        Self::around(self.corners.iter().map(|p| by.transform_point3(*p)).collect(), self.first)
+    /// As another space sees it into which `by` leads from its own, and `back` from there.
+    fn moved(&self, by: &DAffine3, back: &DAffine3) -> Self {
+        let corners = self.corners.iter().map(|p| by.transform_point3(*p)).collect();
+        let turn = back.matrix3.transpose();
+        let normals = self.planes.iter().map(|(normal, _)| (turn * *normal).normalize_or_zero());
+        Self::bounded(corners, self.first, normals.filter(|normal| *normal != DVec3::ZERO))
     }
 
     /// Whether the box is surely outside.
@@ -140,7 +148,7 @@ impl Tlas {
             if placement.is_identity() {
                 return blas.blockers(shaft, patience, |triangle| report(instance, triangle));
             }
-            let local = shaft.moved(placement.local_from_world());
+            let local = shaft.moved(placement.local_from_world(), placement.world_from_local());
             blas.blockers(&local, patience, |triangle| {
                 let placed = |p: Vec3| placement.world_from_local().transform_point3(p.as_dvec3()).as_vec3();
                 report(instance, triangle.map(placed))
