@@ -131,8 +131,8 @@ pub struct RenderSummary {
     pub dropped_samples: u64,
     /// Most memory the process ever had, in bytes, where the system tells.
     pub peak_memory_bytes: Option<u64>,
-    /// The part of the pixels that has samples: less than 1 if there was not even time for one of each. Others show the mean of
-    /// their neighbours, or are black.
+    /// The part of the pixels that has samples: less than 1 if there was not even time for one of each. Others are guessed
+    /// from what is beside them.
     pub looked_at: f64,
     /// What loading had to say.
     pub warnings: Vec<String>,

@@ -89,8 +89,7 @@ impl Shaft {
             })
     }
 
-    /// [`Shaft::misses_box`] for the children of a node, also for those that are not there; all at once, so that vectors are
-    /// used.
+    /// [`Shaft::misses_box`] for the children of a node, all at once, so that vectors are used.
     fn misses_children(&self, node: &WideNode) -> [u32; WIDTH] {
         let mut missed = [0; WIDTH];
         for (axis, [min, max]) in node.bounds.iter().enumerate() {
@@ -191,7 +190,8 @@ fn search(
         *patience -= 1;
         let node = &wide.nodes[index];
         let missed = shaft.misses_children(node);
-        for slot in (0..WIDTH).filter(|&slot| missed[slot] == 0) {
+        let is_there = |&slot: &usize| missed[slot] == 0 && !node.child_bounds(slot).is_empty();
+        for slot in (0..WIDTH).filter(is_there) {
             match Child::unpack(node.children[slot]) {
                 Child::Node(child) => waiting.push(child),
                 Child::Leaf { first, count } => {

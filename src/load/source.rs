@@ -128,7 +128,7 @@ fn inside(reference: &str) -> Option<PathBuf> {
     let mut clean = PathBuf::new();
     for component in Path::new(reference).components() {
         match component {
-            // Elsewhere a colon is a letter like others.
+            // There it would begin another drive, or a stream.
             Component::Normal(name) if cfg!(windows) && name.to_string_lossy().contains(':') => return None,
             Component::Normal(name) => clean.push(name),
             Component::CurDir => {}

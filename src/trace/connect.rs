@@ -101,7 +101,7 @@ impl Batch {
         order.len() as u64
     }
 
-    /// Queues the ray to a light sample.
+    /// Queues the ray to a light sample. The path has what absorbs on the way there.
     #[expect(
         clippy::too_many_arguments,
         reason = "all of one vertex; a struct for one call would only rename them"
@@ -131,7 +131,7 @@ impl Batch {
         if let Some((instance, triangle)) = sample.triangle {
             contribution *= mesh_emission(scene, instance, triangle, sample);
         }
-        if path.absorption != Vec3::ZERO && at.geometric_normal.dot(sample.wi) > 0.0 {
+        if path.absorption != Vec3::ZERO {
             let distance = sample.target.map_or(f32::MAX, |target| target.distance(at.position));
             contribution *= passed(path.absorption, distance);
         }

@@ -41,6 +41,20 @@ pub(super) struct Path {
 }
 
 impl Path {
+    /// What absorbs beyond a vertex.
+    fn absorption_toward(&self, surface: &Surface, at: &Interaction, wi: Vec3) -> Vec3 {
+        match surface.body() {
+            Some(body) if at.geometric_normal.dot(wi) < 0.0 => {
+                if at.front {
+                    body.absorption
+                } else {
+                    Vec3::ZERO
+                }
+            }
+            _ => self.absorption,
+        }
+    }
+
     /// With what is left where its ray has come to `t`.
     fn after(mut self, t: f32) -> Self {
         if self.absorption != Vec3::ZERO {
@@ -115,7 +129,7 @@ pub(super) const DIRECTION: u32 = 2;
 pub(super) const PICK: u32 = 3;
 pub(super) const LIGHT: u32 = 4;
 /// What is farther than a surface by no more than that is where it is: a lamp may lie in the plane of a ceiling.
-const SAME_PLACE: f32 = 1.0 + 4e-6;
+const SAME_PLACE: f32 = 1.0 + 1e-6;
 /// From this depth on a path may end by chance.
 pub(super) const ROULETTE_DEPTH: u32 = 4;
 
@@ -286,6 +300,12 @@ impl Batch {
         let reach = hit.map_or(path.ray.t_max, |hit| hit.t * SAME_PLACE);
         let may_meet = path.depth > 0 || self.diffuse.lights_in_view;
         let found = may_meet.then(|| scene.lights.closest(&Ray { t_max: reach, ..path.ray })).flatten();
+        // The back of a lamp is no surface.
+        let is_seen = |found: &LightHit<'_>| {
+            hit.is_none_or(|hit| found.hit.t <= hit.t)
+                || found.shape.emitted(&path.ray, &found.hit) != Vec3::ZERO
+        };
+        let found = found.filter(is_seen);
         // A bounce finds also those that only shine; the eye and mirrors do not see them.
         if path.bounce.is_some() {
             let on_the_way = Ray { t_max: found.map_or(reach, |found| found.hit.t), ..path.ray };
@@ -295,7 +315,8 @@ impl Batch {
             self.meet(scene, &path, &found);
             return;
         }
-        let path = &hit.map_or(path, |hit| path.after(hit.t));
+        let dimmed = if path.absorption == Vec3::ZERO { None } else { hit.map(|hit| path.after(hit.t)) };
+        let path = dimmed.as_ref().unwrap_or(&path);
         let Some(hit) = hit else {
             let normal = path.bounce.map_or(Vec3::Z, |b| b.from.normal);
             for (light, beyond) in scene.lights.beyond() {
@@ -378,7 +399,8 @@ impl Batch {
         if bsdf.has_smooth_lobes() && !scene.lights.is_empty() {
             for Look { pick, sampler, u } in looks(scene, path.sampler, path.depth, to) {
                 if let Some(sample) = scene.lights.get(pick.light).sample(at.position, bsdf.normal(), u) {
-                    self.connect(scene, path, at, &bsdf, followed, &pick, &sampler, &sample);
+                    let path = Path { absorption: path.absorption_toward(surface, at, sample.wi), ..*path };
+                    self.connect(scene, &path, at, &bsdf, followed, &pick, &sampler, &sample);
                 }
             }
         }
@@ -401,16 +423,7 @@ impl Batch {
             Some(_) => at.lit_origin_toward(sample.wi),
             None => at.origin_toward(sample.wi),
         };
-        let absorption = match surface.body() {
-            Some(body) if at.geometric_normal.dot(sample.wi) < 0.0 => {
-                if at.front {
-                    body.absorption
-                } else {
-                    Vec3::ZERO
-                }
-            }
-            _ => path.absorption,
-        };
+        let absorption = path.absorption_toward(surface, at, sample.wi);
         self.next.push(Path {
             entry: path.entry,
             sampler: path.sampler,

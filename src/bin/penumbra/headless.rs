@@ -110,7 +110,7 @@ fn finish(summary: &RenderSummary, output: &OutputArgs) -> u8 {
     }
     if summary.looked_at < 1.0 {
         let part = 100.0 * summary.looked_at;
-        eprintln!("warning: there was time for {part:.0} % of the pixels; the others are guessed or black");
+        eprintln!("warning: there was time for {part:.0} % of the pixels; the others are guessed");
     }
     if summary.dropped_samples > 0 {
         eprintln!("warning: {} samples were not finite and were left out", summary.dropped_samples);
