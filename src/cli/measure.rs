@@ -93,7 +93,7 @@ pub struct TortureArgs {
     /// For hours: 10^9 rays, 10^8 samples
     #[arg(long)]
     pub long: bool,
-    /// For seconds: few rays and samples
+    /// For a minute or so: fewer rays and samples
     #[arg(long, conflicts_with = "long")]
     pub quick: bool,
     /// Another seed, other rays
