@@ -66,7 +66,7 @@ fn a_smoothed_picture_is_nearer_to_the_truth_and_the_film_does_not_know() {
             println!("| {scene} | {} | {samples} | {without:.4} | {with:.4} |", integrator.name());
             // Each sample looks twice at the lights: from two on there is little to smooth, and at four it is to do no harm (0.77,
             // 0.88 and 0.96 were measured; the owl's highlights are blurred too).
-            let limit = [0.85, 0.95, 1.0][samples.ilog2() as usize];
+            let limit = [0.85, 0.95, 0.95][samples.ilog2() as usize];
             assert!(with < limit * without, "{scene}, {samples} samples: {with} is not below {without}");
         }
     }
