@@ -6,6 +6,7 @@
 //! forward, and D. Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007.
 
 use super::{MOST, Shown};
+use crate::bvh::simd::{Job, Simd};
 use crate::trace::camera::Sheet;
 use crate::trace::place::{Place, Spot, places};
 use crate::trace::{Film, TraceScene};
@@ -17,19 +18,19 @@ use std::time::Instant;
 const ALIKE: f32 = 0.9;
 /// ... and up to a distance of so many pixels from the other one's plane.
 const NEAR: f32 = 4.0;
-/// How closely one looks, least first: least and largest side of the blocks of the new picture
-/// in whose middle one looks (as large as the preview's pixels in between; around it the surface is continued as a
-/// plane), and the share of them that may see an edge, so that their pixels are looked at one by one.
-const EFFORTS: [([u32; 2], f32); 4] = [([8, 8], 0.0), ([4, 8], 0.0), ([4, 4], 0.1), ([2, 4], 0.2)];
-/// Seconds of carrying over above which one looks less closely, and below which more.
-const SECONDS: [f64; 2] = [0.007, 0.013];
+/// Sides of the blocks of the new picture in whose middle one looks, pixels: as large as the preview's pixels, between
+/// these two, or the last if there is no time. Around it the surface is continued as a plane.
+const SIDES: [u32; 3] = [2, 4, 8];
+/// Seconds that carrying over should take.
+const SECONDS: f64 = 0.012;
+/// Of these, what looking may take before one knows where the edges are.
+const FIRST_LOOK: f64 = 0.6;
 /// A preview that counts less than this share of the old samples is left out.
 const NOTABLE: f32 = 0.02;
 /// Old pixels that are worth less are left alone, samples.
 const LEAST: f32 = 1e-3;
-/// Pixels beside a pixel.
-const AROUND: [(f32, f32); 8] =
-    [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+/// Pixels beside a pixel, but for the three that one looks at first.
+const OTHERS: &[[f32; 2]] = &[[-1.0, 0.0], [0.0, -1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
 
 /// The old picture, and the way into it.
 struct Old<'a> {
@@ -41,6 +42,8 @@ struct Old<'a> {
 
 /// A row of the new picture: rays as linear functions of x, in render space and in the old camera's own.
 struct Row {
+    /// Middle of it, pixels.
+    y: f32,
     origin: [Vec3; 2],
     direction: [Vec3; 2],
     old_origin: [Vec3; 2],
@@ -58,10 +61,13 @@ impl Shown {
             self.spots.resize(count, Spot::UNKNOWN);
         }
         let new = scene.viewpoint.sheet(size);
+        let grid = Grid::new(scene, &new, preview, &mut self.pace);
         let start = Instant::now();
-        let grid = Grid::new(scene, &new, preview, EFFORTS.len() - 1 - self.saved.min(EFFORTS.len() - 1));
         self.kept.resize(count, Vec4::ZERO);
         self.spare.resize(count, Spot::UNKNOWN);
+        if std::mem::take(&mut self.is_kept) {
+            std::mem::swap(&mut self.cells, &mut self.kept);
+        }
         let old = Old { size, sheet: before.sheet(size), cells: &self.cells, spots: &self.spots };
         let width = size.x as usize;
         let carried: usize = self
@@ -74,14 +80,27 @@ impl Shown {
         self.share = carried as f64 / count as f64;
         std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
-        let seconds = start.elapsed().as_secs_f64();
-        let [little, much] = SECONDS;
-        if seconds > much {
-            self.saved = (self.saved + 1).min(EFFORTS.len() - 1);
-        } else if seconds < little {
-            self.saved = self.saved.saturating_sub(1);
-        }
+        let looked = grid.exact * self.pace.place.unwrap_or(0.0);
+        note(&mut self.pace.pixel, (start.elapsed().as_secs_f64() - looked).max(0.0), count);
     }
+}
+
+/// What carrying over costs on this machine in this scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pace {
+    /// Seconds for one place that is looked at.
+    pub place: Option<f64>,
+    /// Seconds for one pixel, apart from that.
+    pixel: Option<f64>,
+}
+
+/// Before anything was measured: seconds for a pixel or a place.
+const FIRST_GUESS: f64 = 2e-8;
+
+/// Learns that `count` of something took so long. Half the old value, so that one hiccup of the machine is no rule.
+pub(super) fn note(pace: &mut Option<f64>, seconds: f64, count: usize) {
+    let measured = seconds / count.max(1) as f64;
+    *pace = Some(pace.map_or(measured, |old| 0.5 * (old + measured)));
 }
 
 /// The new picture in blocks, and its preview.
@@ -89,18 +108,23 @@ struct Grid<'a> {
     size: UVec2,
     /// What is in the middle of each.
     blocks: Vec<Place>,
-    /// Pixels of blocks that see an edge are looked at one by one.
-    exact: bool,
+    /// Pixels of blocks that see an edge are looked at one by one: so many, or none.
+    exact: f64,
     preview: Option<&'a Film>,
     /// What a sample of the preview counts: it is of many pixels.
     worth: f32,
 }
 
 impl<'a> Grid<'a> {
-    fn new(scene: &TraceScene, sheet: &Sheet, preview: Option<&'a Film>, effort: usize) -> Self {
+    fn new(scene: &TraceScene, sheet: &Sheet, preview: Option<&'a Film>, pace: &mut Pace) -> Self {
         let full = scene.settings.size;
-        let ([least, most], most_edges) = EFFORTS[effort];
-        let side = preview.map_or(least, |film| (full.y / film.size().y).clamp(least, most));
+        let pixels = f64::from(full.element_product());
+        let mut left = SECONDS - pixels * pace.pixel.unwrap_or(FIRST_GUESS);
+        let [least, middle, most] = SIDES;
+        let side = preview.map_or(least, |film| (full.y / film.size().y).clamp(least, middle));
+        let looks = pixels / f64::from(side * side) * pace.place.unwrap_or(FIRST_GUESS);
+        let side = if looks <= FIRST_LOOK * left { side } else { most };
+        let start = Instant::now();
         let size = (full / side).max(UVec2::ONE);
         let pitch = full.as_vec2() / size.as_vec2();
         let width = size.x as usize;
@@ -110,6 +134,9 @@ impl<'a> Grid<'a> {
                 (0..size.x).map(|x| (Vec2::new(x as f32, y as f32) + 0.5) * pitch).collect();
             places(scene, &middles, row);
         });
+        let seconds = start.elapsed().as_secs_f64();
+        left -= seconds;
+        note(&mut pace.place, seconds, blocks.len());
         // Planes must go on from block to block.
         let mut edges = vec![false; blocks.len()];
         edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
@@ -129,7 +156,9 @@ impl<'a> Grid<'a> {
         }
         let worth =
             preview.map_or(0.0, |film| film.size().element_product() as f32 / full.element_product() as f32);
-        Self { size, exact: count as f32 <= most_edges * blocks.len() as f32, blocks, preview, worth }
+        let exact = count as f64 * pixels / blocks.len() as f64;
+        let is_cheap = exact * pace.place.unwrap_or(FIRST_GUESS) <= left;
+        Self { size, exact: if is_cheap { exact } else { 0.0 }, blocks, preview, worth }
     }
 
     fn at(&self, x: u32, y: u32) -> &Place {
@@ -178,56 +207,119 @@ fn carry_row(
 ) -> usize {
     let row = Row::new(new, &old.sheet, y as f32 + 0.5);
     let v = y * grid.size.y / old.size.y;
-    let block_of = |x: u32| x * grid.size.x / old.size.x;
     let mut exact = Vec::new();
-    if grid.exact {
-        let at_edges: Vec<u32> = (0..old.size.x).filter(|&x| grid.at(block_of(x), v).edge).collect();
-        let middles: Vec<Vec2> =
-            at_edges.iter().map(|&x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
+    if grid.exact > 0.0 {
+        let at_edges = (0..old.size.x).filter(|&x| grid.at(x * grid.size.x / old.size.x, v).edge);
+        let middles: Vec<Vec2> = at_edges.map(|x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
         exact.resize(middles.len(), Place::unknown());
         places(scene, &middles, &mut exact);
     }
-    let mut exact = exact.into_iter();
-    let mut carried = 0;
-    for ((x, kept), found) in (0..old.size.x).zip(kept).zip(found) {
-        let block = grid.at(block_of(x), v);
-        let place = if block.edge { exact.next().unwrap_or(*block) } else { *block };
-        match row.find(new, old, x, y, &place) {
-            Some(hit) => {
-                let cell = old.cells[hit.index];
-                // At an edge the preview may be of another surface; beside many old samples it says nothing.
-                *kept = if block.edge || grid.worth < NOTABLE * hit.weight {
-                    cell.truncate().extend(hit.weight)
-                } else {
-                    let preview = grid.own_color([x, y], old.size);
-                    let sum = hit.weight + grid.worth;
-                    let radiance = (cell.truncate() * hit.weight + preview * grid.worth) / sum;
-                    radiance.extend(sum.min(MOST))
-                };
-                *found = old.spots[hit.index];
-                if let Some(moved) = hit.moved {
-                    found.position = moved;
-                }
-                carried += 1;
-            }
-            None => {
-                let (position, depth) = row.meet(x, &place).unwrap_or((place.position, 1.0));
-                let color = grid.color([x, y], old.size, &place, new.pixel(depth));
-                *kept = color.extend(grid.worth);
-                *found = Spot::from(&Place { position, edge: false, ..place });
-            }
-        }
-    }
-    carried
+    scene.geometry.tlas.isa().run(CarryRow { new, old, grid, row, y, exact, kept, found })
 }
 
-/// An old pixel.
-struct Found {
-    index: usize,
-    /// How many samples it is worth.
-    weight: f32,
-    /// Where its light is taken to be of, if not of where it is.
-    moved: Option<Vec3>,
+struct CarryRow<'a> {
+    new: &'a Sheet,
+    old: &'a Old<'a>,
+    grid: &'a Grid<'a>,
+    row: Row,
+    y: u32,
+    /// What the pixels of blocks that see an edge show, one after the other.
+    exact: Vec<Place>,
+    kept: &'a mut [Vec4],
+    found: &'a mut [Spot],
+}
+
+impl Job for CarryRow<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> usize {
+        let Self { new, old, grid, row, y, exact, kept, found } = self;
+        let mut exact = exact.into_iter().peekable();
+        let v = y * grid.size.y / old.size.y;
+        let (mut carried, mut x) = (0, 0);
+        while x < old.size.x {
+            let u = x * grid.size.x / old.size.x;
+            let block = grid.at(u, v);
+            let (place, end) = match exact.next_if(|_| block.edge) {
+                Some(place) => (place, x + 1),
+                None => (*block, ((u + 1) * old.size.x).div_ceil(grid.size.x)),
+            };
+            let end = end.min(x + RUN as u32);
+            let surface = Spot::from(&Place { edge: false, ..place });
+            let aims = row.aim(new, &old.sheet, x, &place);
+            let finds = aims.find(new, old, &place);
+            for (i, x) in (x..end).enumerate() {
+                let (kept, found) = (&mut kept[x as usize], &mut found[x as usize]);
+                let there = &old.spots[finds.index[i] as usize];
+                let cell = old.cells[finds.index[i] as usize];
+                let keeps = f32::from(place.keeps.min(there.keeps));
+                let weight = cell.w.min(MOST).min(keeps) * aims.spread[i] * aims.spread[i];
+                // Beside an edge it may be of the next pixel.
+                if finds.away[i] <= 2.0 * aims.near[i] && weight > LEAST {
+                    // At an edge the preview may be of another surface; beside many old samples it says nothing.
+                    *kept = if block.edge || grid.worth < NOTABLE * weight {
+                        cell.truncate().extend(weight)
+                    } else {
+                        let preview = grid.own_color([x, y], old.size);
+                        let sum = weight + grid.worth;
+                        let radiance = (cell.truncate() * weight + preview * grid.worth) / sum;
+                        radiance.extend(sum.min(MOST))
+                    };
+                    *found = *there;
+                    if finds.away[i] > aims.near[i] {
+                        found.position = aims.point(i);
+                    }
+                    carried += 1;
+                } else {
+                    let depth = aims.depth[i];
+                    let is_there = depth > 0.0 && depth.is_finite() && place.thing != Place::NOTHING;
+                    let (position, depth) =
+                        if is_there { (aims.point(i), depth) } else { (place.position, 1.0) };
+                    let color = grid.color([x, y], old.size, &place, new.pixel(depth));
+                    *kept = color.extend(grid.worth);
+                    *found = Spot { position, ..surface };
+                }
+            }
+            x = end;
+        }
+        carried
+    }
+}
+
+/// Pixels side by side that show one surface. Plain loops over so many are vectors to the compiler.
+const RUN: usize = 8;
+
+/// Where the plane of a surface is for each pixel of a run, and where that was in the old picture.
+struct Aims {
+    /// In render space.
+    points: [[f32; RUN]; 3],
+    /// In the new picture; not positive or not finite where there is no plane.
+    depth: [f32; RUN],
+    /// In the old picture, pixels, ...
+    at: [[f32; RUN]; 2],
+    /// ... and how far away.
+    old_depth: [f32; RUN],
+    /// Middles of the pixels.
+    middles: [[f32; RUN]; 2],
+    /// The share of an old pixel that a new one shows, along one side, at most 1: one old pixel for many new ones says less
+    /// about each.
+    spread: [f32; RUN],
+    /// What is so far away from the middle of a pixel is beside it, pixels.
+    near: [f32; RUN],
+    /// What is so far away from the plane is not of it, scene units.
+    reach: [f32; RUN],
+}
+
+/// The best old pixel for each of a run.
+struct Finds {
+    index: [u32; RUN],
+    /// How far its light is from the middle of the pixel, pixels along one side; infinite if there is none.
+    away: [f32; RUN],
+    /// The same, with its direction.
+    off: [[f32; RUN]; 2],
+    /// The square of its length.
+    square: [f32; RUN],
 }
 
 impl Row {
@@ -235,6 +327,7 @@ impl Row {
         let at = |[start, across, down]: [Vec3; 3]| [start + down * y + across * 0.5, across];
         let (origin, direction) = (at(new.origin), at(new.direction));
         Self {
+            y,
             origin,
             direction,
             old_origin: [old.own(origin[0]), old.axes * origin[1]],
@@ -242,87 +335,152 @@ impl Row {
         }
     }
 
-    /// Where the ray of pixel `x` meets the plane of `place`, and how deep.
+    /// From pixel `first` on, for the plane of `place`, or for what is infinitely far.
     #[inline(always)]
-    fn meet(&self, x: u32, place: &Place) -> Option<(Vec3, f32)> {
-        let at = |[start, across]: [Vec3; 2]| start + across * x as f32;
-        let (origin, direction) = (at(self.origin), at(self.direction));
-        let t = place.facet.dot(place.position - origin) / place.facet.dot(direction);
-        // NaN where there is no plane.
-        (t > 0.0 && t.is_finite()).then(|| (origin + direction * t, t))
-    }
-
-    /// The old pixel that shows what pixel `x` shows if it is of the surface of `place`.
-    #[inline(always)]
-    fn find(&self, new: &Sheet, old: &Old, x: u32, y: u32, place: &Place) -> Option<Found> {
-        let at = |[start, across]: [Vec3; 2]| start + across * x as f32;
-        if place.thing == Place::NOTHING {
-            // Parallel rays see one point of what is infinitely far.
-            if !(new.perspective && old.sheet.perspective) {
-                return None;
-            }
-            let own = at(self.old_direction);
-            let index = old.index(old.sheet.place(own), own.z)?;
-            let there = &old.spots[index];
-            let weight = old.cells[index].w.min(MOST);
-            let is_it = there.thing == Place::NOTHING && there.keeps > 0 && weight > LEAST;
-            return is_it.then_some(Found { index, weight, moved: None });
+    fn aim(&self, new: &Sheet, old: &Sheet, first: u32, place: &Place) -> Aims {
+        let nothing = place.thing == Place::NOTHING;
+        let ([o, o_across], [d, d_across]) = (self.origin, self.direction);
+        let (above, sinks) = (place.facet.dot(place.position - o), place.facet.dot(o_across));
+        let (falls, falls_across) = (place.facet.dot(d), place.facet.dot(d_across));
+        let [mut from, mut from_across] = self.old_origin;
+        let [to, to_across] = self.old_direction;
+        if nothing {
+            (from, from_across) = (Vec3::ZERO, Vec3::ZERO);
         }
-        let (point, depth) = self.meet(x, place)?;
-        let own = at(self.old_origin) + at(self.old_direction) * depth;
-        let (pixel, old_pixel) = (new.pixel(depth), old.sheet.pixel(own.z));
-        let reach = NEAR * pixel.max(old_pixel);
-        let is_it = |index: usize| {
-            let there = &old.spots[index];
-            there.thing == place.thing
-                && there.keeps > 0
-                && there.facet().dot(place.facet) > ALIKE
-                && place.facet.dot(there.position - point).abs() <= reach
-        };
-        let middle = Vec2::new(x as f32, y as f32) + 0.5;
-        let off = |index: usize| new.place(new.own(old.spots[index].position)) - middle;
-        // One old pixel for many new ones says less about each.
-        let spread = (pixel / old_pixel).min(1.0);
-        let near = 0.8 / spread;
-        let center = old.sheet.place(own);
-        let first = old.index(center, own.z)?;
-        let (mut index, mut moved) = (first, None);
-        let mut away = Vec2::INFINITY;
-        if is_it(first) {
-            away = off(first);
+        let mut xs = [0.0; RUN];
+        for (i, x) in xs.iter_mut().enumerate() {
+            *x = first as f32 + i as f32;
         }
-        if away.abs().max_element() > near {
-            // It is of a place beside its pixel, or of several surfaces: a neighbour may be nearer.
-            for (dx, dy) in AROUND {
-                let Some(other) = old.index(center + Vec2::new(dx, dy), own.z).filter(|&i| is_it(i)) else {
-                    continue;
-                };
-                let its = off(other);
-                if its.length_squared() < away.length_squared() {
-                    (index, away) = (other, its);
-                }
+        let mut depth = [1.0; RUN];
+        if !nothing {
+            for i in 0..RUN {
+                depth[i] = (above - sinks * xs[i]) / (falls + falls_across * xs[i]);
             }
-            // Beside an edge it may be of the next pixel.
-            if away.abs().max_element() > 2.0 * near {
-                return None;
-            }
-            moved = (away.abs().max_element() > near).then_some(point);
         }
-        let keeps = f32::from(place.keeps.min(old.spots[index].keeps));
-        let weight = old.cells[index].w.min(MOST).min(keeps) * (spread * spread);
-        (weight > LEAST).then_some(Found { index, weight, moved })
+        let (mut points, mut own) = ([[0.0; RUN]; 3], [[0.0; RUN]; 3]);
+        for axis in 0..3 {
+            for i in 0..RUN {
+                let (x, t) = (xs[i], depth[i]);
+                points[axis][i] = o[axis] + o_across[axis] * x + (d[axis] + d_across[axis] * x) * t;
+                own[axis][i] = from[axis] + from_across[axis] * x + (to[axis] + to_across[axis] * x) * t;
+            }
+        }
+        let [mut at, mut middles] = [[[0.0; RUN]; 2]; 2];
+        let (mut spread, mut near, mut reach) = ([1.0; RUN], [1.0; RUN], [0.0; RUN]);
+        for i in 0..RUN {
+            let there = old.place(Vec3::new(own[0][i], own[1][i], own[2][i]));
+            (at[0][i], at[1][i]) = (there.x, there.y);
+            (middles[0][i], middles[1][i]) = (xs[i] + 0.5, self.y);
+            if !nothing {
+                let (pixel, old_pixel) = (new.pixel(depth[i]), old.pixel(own[2][i]));
+                spread[i] = (pixel / old_pixel).min(1.0);
+                near[i] = 0.8 / spread[i];
+                reach[i] = NEAR * pixel.max(old_pixel);
+            }
+        }
+        Aims { points, depth, at, old_depth: own[2], middles, spread, near, reach }
     }
 }
 
-impl Old<'_> {
-    /// The pixel there.
+impl Aims {
     #[inline(always)]
-    fn index(&self, at: Vec2, depth: f32) -> Option<usize> {
-        let inside = depth > 0.0
-            && at.x >= 0.0
-            && at.y >= 0.0
-            && at.x < self.size.x as f32
-            && at.y < self.size.y as f32;
-        inside.then(|| at.y as usize * self.size.x as usize + at.x as usize)
+    fn point(&self, i: usize) -> Vec3 {
+        Vec3::new(self.points[0][i], self.points[1][i], self.points[2][i])
+    }
+
+    /// The old pixels that show what these show if it is of the surface of `place`.
+    #[inline(always)]
+    fn find(&self, new: &Sheet, old: &Old, place: &Place) -> Finds {
+        let none = [f32::INFINITY; RUN];
+        let mut finds = Finds { index: [0; RUN], away: none, off: [none; 2], square: none };
+        // Parallel rays see one point of what is infinitely far.
+        if place.thing == Place::NOTHING && !(new.perspective && old.sheet.perspective) {
+            return finds;
+        }
+        self.look(&self.at, new, old, place, &mut finds);
+        let (mut is_beside, mut is_lost) = (false, false);
+        for i in 0..RUN {
+            is_beside |= finds.away[i] > self.near[i];
+            is_lost |= finds.away[i] == f32::INFINITY;
+        }
+        if is_beside && place.thing != Place::NOTHING {
+            // It is of a place beside its pixel: pixels on the other side may be nearer.
+            let mut beside = [self.at; 3];
+            for i in 0..RUN {
+                let x = if finds.off[0][i] > 0.0 { -1.0 } else { 1.0 };
+                let y = if finds.off[1][i] > 0.0 { -1.0 } else { 1.0 };
+                beside[0][0][i] += x;
+                beside[1][1][i] += y;
+                beside[2][0][i] += x;
+                beside[2][1][i] += y;
+            }
+            for at in &beside {
+                self.look(at, new, old, place, &mut finds);
+            }
+            // The others, if there was another surface.
+            for [x, y] in if is_lost { OTHERS } else { &[] } {
+                let mut at = self.at;
+                for i in 0..RUN {
+                    at[0][i] += x;
+                    at[1][i] += y;
+                }
+                self.look(&at, new, old, place, &mut finds);
+            }
+        }
+        finds
+    }
+
+    /// Takes the old pixels at `at` where they are better than what was found so far.
+    #[inline(always)]
+    fn look(&self, at: &[[f32; RUN]; 2], new: &Sheet, old: &Old, place: &Place, finds: &mut Finds) {
+        let [width, height] = old.size.as_vec2().to_array();
+        let (mut index, mut is_it) = ([0; RUN], [false; RUN]);
+        for i in 0..RUN {
+            let (x, y) = (at[0][i], at[1][i]);
+            is_it[i] = (self.depth[i] > 0.0) & (self.old_depth[i] > 0.0) & (x >= 0.0) & (y >= 0.0);
+            is_it[i] &= (x < width) & (y < height);
+            // Somewhere in it, also if it is not a number.
+            let (x, y) = (x.max(0.0).min(width - 1.0), y.max(0.0).min(height - 1.0));
+            index[i] = y as i32 * old.size.x as i32 + x as i32;
+        }
+        let (mut points, mut words) = ([[0.0; RUN]; 3], [0_u32; RUN]);
+        for i in 0..RUN {
+            let there = &old.spots[index[i] as usize];
+            [points[0][i], points[1][i], points[2][i]] = there.position.to_array();
+            is_it[i] &= there.thing == place.thing;
+            let [x, y, z] = there.facet;
+            words[i] = u32::from_le_bytes([x as u8, y as u8, z as u8, there.keeps]);
+        }
+        let mut facets = [[0.0; RUN]; 3];
+        for (axis, facet) in facets.iter_mut().enumerate() {
+            for i in 0..RUN {
+                facet[i] = ((words[i] << (24 - 8 * axis)) as i32 >> 24) as f32 * (1.0 / 127.0);
+            }
+        }
+        for i in 0..RUN {
+            is_it[i] &= words[i] >> 24 > 0;
+        }
+        if place.thing == Place::NOTHING {
+            for i in 0..RUN {
+                finds.index[i] = index[i] as u32;
+                finds.away[i] = if is_it[i] { 0.0 } else { f32::INFINITY };
+            }
+            return;
+        }
+        for i in 0..RUN {
+            let there = Vec3::new(points[0][i], points[1][i], points[2][i]);
+            let facet = Vec3::new(facets[0][i], facets[1][i], facets[2][i]);
+            let off_plane = place.facet.dot(there - self.point(i)).abs();
+            is_it[i] &= (facet.dot(place.facet) > ALIKE) & (off_plane <= self.reach[i]);
+            let place = new.place(new.own(there));
+            let (x, y) = (place.x - self.middles[0][i], place.y - self.middles[1][i]);
+            let square = x * x + y * y;
+            let is_better = is_it[i] & (square < finds.square[i]);
+            finds.index[i] = if is_better { index[i] as u32 } else { finds.index[i] };
+            finds.away[i] = if is_better { x.abs().max(y.abs()) } else { finds.away[i] };
+            finds.off[0][i] = if is_better { x } else { finds.off[0][i] };
+            finds.off[1][i] = if is_better { y } else { finds.off[1][i] };
+            finds.square[i] = if is_better { square } else { finds.square[i] };
+        }
     }
 }

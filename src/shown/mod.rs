@@ -61,12 +61,14 @@ pub struct Shown {
     exact_rows: usize,
     /// The same as `cells`, carried over from the view before; nothing of the film.
     kept: Vec<Vec4>,
+    /// Whether the last picture was `kept` itself, and `cells` is an older one.
+    is_kept: bool,
     /// Share of the pixels that are in `kept` with old samples; 0: it holds nothing.
     share: f64,
     /// Seconds that carrying over and developing took, the last time.
     pub seconds: [f64; 2],
-    /// How much less closely than one could one looks at the new view, to be in time.
-    saved: usize,
+    /// How much one can look at in time.
+    pace: carry::Pace,
     /// To be overwritten.
     spare: Vec<Spot>,
 }
@@ -103,8 +105,13 @@ impl Shown {
     /// The last picture in linear light, as it was shown.
     #[must_use]
     pub fn image(&self) -> LinearImage {
-        let cells = self.smoothed.as_ref().unwrap_or(&self.cells);
+        let cells = self.smoothed.as_deref().unwrap_or(self.cells());
         LinearImage { size: self.size, pixels: cells.iter().map(|cell| cell.truncate()).collect() }
+    }
+
+    /// The last picture before smoothing: radiance, and how many samples it is worth.
+    fn cells(&self) -> &[Vec4] {
+        if self.is_kept { &self.kept } else { &self.cells }
     }
 
     /// Whether each pixel's surface is known, so that it can be smoothed.
@@ -124,6 +131,7 @@ impl Shown {
         }
         self.places.resize(count, Place::unknown());
         while self.exact_rows < height && keep_going() {
+            let start = Instant::now();
             let first = self.exact_rows;
             let last = (first + BAND).min(height);
             let rows = first * width..last * width;
@@ -132,6 +140,7 @@ impl Shown {
                     (0..width).map(|x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
                 places(scene, &middles, row);
             });
+            carry::note(&mut self.pace.place, start.elapsed().as_secs_f64(), (last - first) * width);
             // A row's edges are known when the one below is.
             let sheet = scene.viewpoint.sheet(self.size);
             let known = if last == height { height } else { last - 1 };
@@ -158,25 +167,32 @@ impl Shown {
         }
     }
 
-    /// Brings the picture up to date. Where there is no sample at all, `coarse` shows through.
-    fn compose(&mut self, film: &Film, coarse: Option<&Film>, fade: f32) {
+    /// Brings the picture up to date, or some of it. Where there is no sample at all, `coarse` shows through.
+    fn compose(
+        &mut self,
+        film: &Film,
+        coarse: Option<&Film>,
+        fade: f32,
+        keep_going: impl Fn() -> bool + Sync,
+    ) {
         let size = film.size();
         let width = size.x as usize;
         self.size = size;
-        self.cells.resize(width * size.y as usize, Vec4::ZERO);
+        let count = width * size.y as usize;
         // While one moves there is nothing but what was carried over.
-        if self.share > 0.0
-            && self.kept.len() == self.cells.len()
-            && fade == 1.0
-            && film.mean_samples() == 0.0
-        {
-            let chunks = self.cells.par_chunks_mut(width).zip(self.kept.par_chunks(width));
-            chunks.for_each(|(cells, kept)| cells.copy_from_slice(kept));
+        let was_kept = self.is_kept;
+        self.is_kept =
+            self.share > 0.0 && self.kept.len() == count && fade == 1.0 && film.mean_samples() == 0.0;
+        if self.is_kept {
             return;
         }
+        self.cells.resize(count, Vec4::ZERO);
         let fade = if self.share > 0.0 && self.kept.len() == self.cells.len() { fade } else { 0.0 };
         let kept = &self.kept;
         self.cells.par_chunks_exact_mut(width).zip(0..size.y).for_each(|(row, y)| {
+            if !keep_going() {
+                return;
+            }
             for ((x, pixel), cell) in (0..size.x).zip(film.row(y)).zip(row) {
                 let old = if fade > 0.0 { kept[y as usize * width + x as usize] } else { Vec4::ZERO };
                 let (count, old_count) = (pixel.count() as f32, old.w * fade);
@@ -195,6 +211,8 @@ impl Shown {
                 *cell = radiance.extend(count + old_count);
             }
         });
+        // Half of it may be of another view.
+        self.is_kept = was_kept && !keep_going();
     }
 }
 
@@ -271,26 +289,33 @@ pub fn develop_film(
     budget: Res<FrameBudget>,
     mut shown: ResMut<Shown>,
     mut picture: ResMut<Picture>,
+    mut is_late: Local<bool>,
 ) {
-    if !(film.is_changed() || display.is_changed() || shown.is_changed()) {
+    if !(film.is_changed() || display.is_changed() || shown.is_changed() || *is_late) {
         return;
     }
     let start = Instant::now();
     let shown = shown.bypass_change_detection();
-    shown.compose(&film, preview.film(), fade(film.complete_samples(), stats.done));
+    let keep_going = || !budget.interrupt.load(Ordering::Relaxed);
+    let fade = fade(film.complete_samples(), stats.done);
+    shown.compose(&film, preview.film(), fade, || stats.begun || keep_going());
+    // Whoever asks for another picture does not wait for this one.
+    *is_late = !(stats.begun || keep_going());
+    if *is_late {
+        return;
+    }
     let is_young = stats.trace_seconds - shown.began < SMOOTHED && !stats.done && !stats.begun;
     let is_noisy = film.complete_samples() > 0 && stats.noise.is_none_or(|noise| noise > NOISY);
     // Neighbours that share their paths have nothing left to tell each other.
     let is_shared = settings.shares_paths();
     let wanted = !(shown.never_smooth || shown.hold_smoothing || is_shared) && is_young && is_noisy;
-    let keep_going = || !budget.interrupt.load(Ordering::Relaxed);
     shown.smoothed = (wanted && shown.is_looked_at() && shown.viewpoint == Some(*viewpoint))
         .then(|| smooth::smooth(&film, &shown.cells, &shown.places, &viewpoint.sheet(shown.size), keep_going))
         .flatten();
     let picture = &mut *picture;
     picture.size = shown.size;
-    picture.rgba.resize(shown.cells.len() * 4, 255);
-    let cells = shown.smoothed.as_ref().unwrap_or(&shown.cells);
+    let cells = shown.smoothed.as_deref().unwrap_or(shown.cells());
+    picture.rgba.resize(cells.len() * 4, 255);
     develop_linear(cells, shown.size, &display, &mut picture.rgba);
     picture.version += 1;
     shown.seconds[1] = start.elapsed().as_secs_f64();

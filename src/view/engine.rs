@@ -34,6 +34,9 @@ const RESTING: std::ops::RangeInclusive<Duration> = Duration::from_millis(30)..=
 /// The longer the view rests, the rarer the pictures: this share of the time since it changed.
 const RESTING_SHARE: f64 = 0.1;
 
+/// The longest that one waits for a picture to be presented.
+const PRESENTING: Duration = Duration::from_millis(20);
+
 /// Whether there is something left to do although all samples are there. Set by systems, lowered before each frame.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending(pub bool);
@@ -92,6 +95,8 @@ pub struct Engine<W> {
     pub interrupt: Arc<AtomicBool>,
     /// To the window.
     pub published: Arc<Mutex<Published>>,
+    /// Versions of the pictures that have been presented, if that takes time from tracing.
+    pub presented: Option<Receiver<u64>>,
     /// Makes the window look.
     pub wake: W,
 }
@@ -213,6 +218,9 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 && !app.world.resource::<Pending>().0;
             self.say(app);
             self.publish(app, version, moving, asked);
+            if moving {
+                self.await_presented(app.world.resource::<Picture>().version);
+            }
         }
     }
 
@@ -291,6 +299,19 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         drop(published);
         if news {
             (self.wake)(Wake::FrameReady);
+        }
+    }
+
+    /// Where presenting takes time from tracing, one after the other: together each would only take longer, and the picture
+    /// that somebody waits for would come later.
+    fn await_presented(&self, version: u64) {
+        let Some(presented) = &self.presented else { return };
+        let until = Instant::now() + PRESENTING;
+        // If none comes, the window is hidden or slow.
+        while let Ok(other) = presented.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            if other >= version {
+                break;
+            }
         }
     }
 

@@ -115,6 +115,10 @@ impl Viewer {
     }
 
     pub(super) fn was_presented(&mut self, now: Instant) {
+        if let Some(engine) = &self.engine {
+            // Who does not wait for it does not care.
+            let _ = engine.presented.send(self.picture.version);
+        }
         self.presented.push_back(now);
         self.response.pictures += 1;
         self.longest_pause(now);

@@ -3,8 +3,8 @@
 use super::engine::{lock, panic_message};
 use super::without_place;
 use glam::UVec2;
-use pixels::wgpu::{DeviceType, SurfaceError};
-use pixels::{Error, Pixels, SurfaceTexture};
+use pixels::wgpu::{DeviceType, PresentMode, SurfaceError, TextureFormat};
+use pixels::{Error, Pixels, PixelsBuilder, SurfaceTexture};
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -55,18 +55,29 @@ impl Screen {
         let size = vector(window.inner_size()).max(UVec2::ONE);
         let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(&window));
         // wgpu panics if WGPU_ADAPTER_NAME matches nothing.
-        let pixels = quietly(|| Pixels::new(size.x, size.y, surface))
+        let mut pixels = quietly(|| Pixels::new(size.x, size.y, surface))
             .map_err(|panic| format!("no graphics adapter: {panic}"))?
             .map_err(|e| {
                 format!("no graphics adapter (Vulkan or GL) can draw into the window: {}", with_sources(&e))
             })?;
+        let software = pixels.adapter().get_info().device_type == DeviceType::Cpu;
+        if software && let Some(format) = plain_format(&pixels) {
+            // One surface for each window.
+            drop(pixels);
+            let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(&window));
+            pixels = PixelsBuilder::new(size.x, size.y, surface)
+                .texture_format(TextureFormat::Rgba8Unorm)
+                .surface_texture_format(format)
+                .present_mode(PresentMode::Mailbox)
+                .build()
+                .map_err(|e| format!("the software adapter fails: {}", with_sources(&e)))?;
+        }
         let device_error = Arc::new(Mutex::new(None));
         let seen = Arc::clone(&device_error);
         // wgpu's own handler panics, for instance when another program destroys the window.
         pixels.device().on_uncaptured_error(Arc::new(move |error: pixels::wgpu::Error| {
             lock(&seen).get_or_insert_with(|| error.to_string());
         }));
-        let software = pixels.adapter().get_info().device_type == DeviceType::Cpu;
         Ok(Self { pixels, window, software, size, failures: 0, device_error })
     }
 
@@ -106,6 +117,13 @@ impl Screen {
         let full = self.window.fullscreen().is_none().then_some(Fullscreen::Borderless(None));
         self.window.set_fullscreen(full);
     }
+}
+
+/// A format of the surface that takes our bytes as they are: an adapter on the CPU is not to make light of
+/// them and bytes again.
+fn plain_format(pixels: &Pixels<'_>) -> Option<TextureFormat> {
+    let formats = &pixels.context().surface_capabilities.formats;
+    [TextureFormat::Bgra8Unorm, TextureFormat::Rgba8Unorm].into_iter().find(|format| formats.contains(format))
 }
 
 /// What became of a picture, given what the surface and the device say, after so many failures in a row.

@@ -107,6 +107,8 @@ pub(super) struct Link {
     pub(super) commands: Sender<Command>,
     pub(super) interrupt: Arc<AtomicBool>,
     pub(super) published: Arc<Mutex<Published>>,
+    /// Versions of the pictures that have been presented.
+    pub(super) presented: Sender<u64>,
     /// Disconnected when the engine's thread has ended.
     pub(super) ended: Receiver<Infallible>,
 }
@@ -181,6 +183,7 @@ impl Viewer {
         let Some(open) = self.open.take() else { return };
         let (commands, receiver) = channel();
         let (alive, ended) = channel();
+        let (presented, presented_receiver) = channel();
         let interrupt = Arc::new(AtomicBool::new(false));
         let name = &self.options.screenshot_stem;
         let loading = Some(format!("loading {name} …"));
@@ -194,6 +197,11 @@ impl Viewer {
             own: commands.clone(),
             interrupt: Arc::clone(&interrupt),
             published: Arc::clone(&published),
+            presented: self
+                .screen
+                .as_ref()
+                .is_some_and(|screen| screen.software)
+                .then_some(presented_receiver),
             // The event loop is gone: so is who would look.
             wake: move |wake| drop(proxy.send_event(wake)),
         };
@@ -203,7 +211,7 @@ impl Viewer {
         });
         match thread {
             Ok(_) => {
-                self.engine = Some(Link { commands, interrupt, published, ended });
+                self.engine = Some(Link { commands, interrupt, published, presented, ended });
             }
             Err(error) => drop(self.proxy.send_event(Wake::Crashed(error.to_string()))),
         }

@@ -27,6 +27,7 @@ fn an_interrupt_that_comes_late_keeps_no_picture_back() {
         own: commands.clone(),
         interrupt: Arc::default(),
         published: Arc::clone(&published),
+        presented: None,
         wake: |_| (),
     };
     let engine = std::thread::spawn(move || {
