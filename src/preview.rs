@@ -12,12 +12,18 @@ pub struct Preview {
     seconds_per_pixel: Option<f64>,
     /// Seconds of a first picture that others need.
     reserved: f64,
+    /// Seconds that an answer takes beside all that.
+    others: f64,
     /// Whether `scale` stays as it is.
     fixed: bool,
 }
 
-/// Time that a preview may take, with what is carried over from the picture before.
-const TARGET: Duration = Duration::from_millis(14);
+/// Seconds that a preview may take, with what is carried over from the picture before, ...
+const TARGET: f64 = 0.014;
+/// ... less if an answer would take longer than this otherwise, ...
+const ANSWER: f64 = 0.03;
+/// ... but this in any case.
+const LEAST: f64 = 0.006;
 /// Of that, what is left to the preview in any case.
 const OWN: f64 = 0.35;
 /// A finer step is taken only if it is expected to need less than this part of [`TARGET`]: without the
@@ -28,7 +34,7 @@ const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
 impl Default for Preview {
     fn default() -> Self {
-        Self { film: None, scale: 8, seconds_per_pixel: None, reserved: 0.0, fixed: false }
+        Self { film: None, scale: 8, seconds_per_pixel: None, reserved: 0.0, others: 0.0, fixed: false }
     }
 }
 
@@ -71,6 +77,17 @@ impl Preview {
         self.reserved = 0.5 * (self.reserved + time.as_secs_f64());
     }
 
+    /// Learns how long an answer took from the key to the screen, apart from preview and carrying over.
+    pub fn answered(&mut self, others: f64) {
+        self.others = 0.75 * self.others + 0.25 * others.max(0.0);
+    }
+
+    /// Seconds for it and for what is carried over.
+    #[must_use]
+    pub fn target(&self) -> f64 {
+        (ANSWER - self.others).clamp(LEAST, TARGET)
+    }
+
     /// The coarse film, if the last preview needed one.
     #[must_use]
     pub fn film(&self) -> Option<&Film> {
@@ -85,8 +102,7 @@ impl Preview {
 
     fn choose_scale(&mut self, pixels: f64) {
         let Some(seconds_per_pixel) = self.seconds_per_pixel.filter(|_| !self.fixed) else { return };
-        let target = TARGET.as_secs_f64();
-        let target = (target - self.reserved).max(OWN * target);
+        let target = (self.target() - self.reserved).max(OWN * self.target());
         let cost = |scale: u32| seconds_per_pixel * pixels / f64::from(scale * scale) / target;
         let fits = |limit: f64| SCALES.into_iter().find(|&s| cost(s) <= limit).unwrap_or(16);
         if cost(self.scale) > 1.0 {
@@ -114,6 +130,10 @@ mod tests {
         assert_eq!(at(3, 50.0), 3, "12.5 ms at half size would fit, but not with headroom");
         assert_eq!(at(2, 50.0), 2, "and so it stays from below");
         assert_eq!(at(2, 1e9), 16, "never coarser than 16");
+        let mut slow = Preview { scale: 3, seconds_per_pixel: Some(0.1), ..Preview::default() };
+        (0..20).for_each(|_| slow.answered(0.02));
+        slow.choose_scale(1.0);
+        assert_eq!(slow.scale, 4, "where the rest of an answer takes 20 ms, 10 are left");
         let mut fixed = Preview { seconds_per_pixel: Some(1e9), ..Preview::at_scale(2) };
         fixed.choose_scale(1.0);
         assert_eq!(fixed.scale, 2, "unless told");

@@ -21,16 +21,15 @@ const NEAR: f32 = 4.0;
 /// Sides of the blocks of the new picture in whose middle one looks, pixels: as large as the preview's pixels, between
 /// these two, or the last if there is no time. Around it the surface is continued as a plane.
 const SIDES: [u32; 3] = [2, 4, 8];
-/// Seconds that carrying over should take.
-const SECONDS: f64 = 0.012;
-/// Of these, what looking may take before one knows where the edges are.
+/// Of the time for carrying over, what looking may take before one knows where the edges are.
 const FIRST_LOOK: f64 = 0.6;
 /// A preview that counts less than this share of the old samples is left out.
 const NOTABLE: f32 = 0.02;
 /// Old pixels that are worth less are left alone, samples.
 const LEAST: f32 = 1e-3;
-/// Pixels beside a pixel, but for the three that one looks at first.
-const OTHERS: &[[f32; 2]] = &[[-1.0, 0.0], [0.0, -1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+/// Pixels beside a pixel, but for the one at (1, 1), where one looks first if there is nothing in its own.
+const OTHERS: &[[f32; 2]] =
+    &[[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
 
 /// The old picture, and the way into it.
 struct Old<'a> {
@@ -51,8 +50,8 @@ struct Row {
 }
 
 impl Shown {
-    /// Makes `kept` and `spots` those of `scene`'s viewpoint.
-    pub(super) fn carry(&mut self, scene: &TraceScene, preview: Option<&Film>) {
+    /// Makes `kept` and `spots` those of `scene`'s viewpoint, in about so many seconds.
+    pub(super) fn carry(&mut self, scene: &TraceScene, preview: Option<&Film>, seconds: f64) {
         let Some(before) = self.viewpoint.replace(*scene.viewpoint) else { return };
         let size = self.size;
         let count = size.element_product() as usize;
@@ -61,7 +60,7 @@ impl Shown {
             self.spots.resize(count, Spot::UNKNOWN);
         }
         let new = scene.viewpoint.sheet(size);
-        let grid = Grid::new(scene, &new, preview, &mut self.pace);
+        let grid = Grid::new(scene, &new, preview, &mut self.pace, seconds);
         let start = Instant::now();
         self.kept.resize(count, Vec4::ZERO);
         self.spare.resize(count, Spot::UNKNOWN);
@@ -116,10 +115,16 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(scene: &TraceScene, sheet: &Sheet, preview: Option<&'a Film>, pace: &mut Pace) -> Self {
+    fn new(
+        scene: &TraceScene,
+        sheet: &Sheet,
+        preview: Option<&'a Film>,
+        pace: &mut Pace,
+        seconds: f64,
+    ) -> Self {
         let full = scene.settings.size;
         let pixels = f64::from(full.element_product());
-        let mut left = SECONDS - pixels * pace.pixel.unwrap_or(FIRST_GUESS);
+        let mut left = seconds - pixels * pace.pixel.unwrap_or(FIRST_GUESS);
         let [least, middle, most] = SIDES;
         let side = preview.map_or(least, |film| (full.y / film.size().y).clamp(least, middle));
         let looks = pixels / f64::from(side * side) * pace.place.unwrap_or(FIRST_GUESS);
@@ -404,19 +409,15 @@ impl Aims {
             is_lost |= finds.away[i] == f32::INFINITY;
         }
         if is_beside && place.thing != Place::NOTHING {
-            // It is of a place beside its pixel: pixels on the other side may be nearer.
-            let mut beside = [self.at; 3];
-            for i in 0..RUN {
-                let x = if finds.off[0][i] > 0.0 { -1.0 } else { 1.0 };
-                let y = if finds.off[1][i] > 0.0 { -1.0 } else { 1.0 };
-                beside[0][0][i] += x;
-                beside[1][1][i] += y;
-                beside[2][0][i] += x;
-                beside[2][1][i] += y;
+            // It is of a place beside its pixel, and so are those of its neighbours: one on the other side is nearer.
+            let mut beside = self.at;
+            for (at, off) in beside.iter_mut().zip(&finds.off) {
+                for i in 0..RUN {
+                    let step = if off[i] > 0.0 { -1.0 } else { 1.0 };
+                    at[i] += if off[i].abs() > 0.5 { step } else { 0.0 };
+                }
             }
-            for at in &beside {
-                self.look(at, new, old, place, &mut finds);
-            }
+            self.look(&beside, new, old, place, &mut finds);
             // The others, if there was another surface.
             for [x, y] in if is_lost { OTHERS } else { &[] } {
                 let mut at = self.at;

@@ -32,6 +32,8 @@ const LOOK_TIME: Duration = Duration::from_millis(12);
 const SMOOTHED: f64 = 1.0;
 /// ... as long as it is so noisy: below, smoothing would hide more than it shows.
 const NOISY: f64 = 0.01;
+/// Share of the time for a preview that carrying over takes, if it needs it.
+const CARRYING: f64 = 0.85;
 /// Rows between two looks at the clock.
 const BAND: usize = 16;
 
@@ -264,7 +266,8 @@ pub fn keep(
         let can_carry = !is_other && !scene.viewpoint.has_lens() && shown.size == film.size();
         if can_carry && shown.viewpoint.is_some_and(|old| !old.has_lens()) {
             let start = Instant::now();
-            shown.carry(&scene, preview.film());
+            let seconds = CARRYING * preview.target();
+            shown.carry(&scene, preview.film(), seconds);
             preview.reserve(start.elapsed());
             shown.seconds[0] = start.elapsed().as_secs_f64();
         } else {

@@ -18,6 +18,8 @@ use crate::image::develop::develop_image;
 use crate::image::{Display, Picture};
 use crate::load::{SceneSource, Watcher};
 use crate::open::SceneOrigin;
+use crate::preview::Preview;
+use crate::shown::Shown;
 use crate::sync::Redone;
 use bevy_ecs::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -218,8 +220,13 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 && !app.world.resource::<Pending>().0;
             self.say(app);
             self.publish(app, version, moving, asked);
-            if moving {
-                self.await_presented(app.world.resource::<Picture>().version);
+            if moving
+                && self.await_presented(app.world.resource::<Picture>().version)
+                && let Some(asked) = asked
+            {
+                let known = app.world.resource::<FrameStats>().preview_seconds
+                    + app.world.resource::<Shown>().seconds[0];
+                app.world.resource_mut::<Preview>().answered(asked.elapsed().as_secs_f64() - known);
             }
         }
     }
@@ -303,16 +310,17 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
     }
 
     /// Where presenting takes time from tracing, one after the other: together each would only take longer, and the picture
-    /// that somebody waits for would come later.
-    fn await_presented(&self, version: u64) {
-        let Some(presented) = &self.presented else { return };
+    /// that somebody waits for would come later. Whether it has been seen to be presented.
+    fn await_presented(&self, version: u64) -> bool {
+        let Some(presented) = &self.presented else { return false };
         let until = Instant::now() + PRESENTING;
         // If none comes, the window is hidden or slow.
         while let Ok(other) = presented.recv_timeout(until.saturating_duration_since(Instant::now())) {
             if other >= version {
-                break;
+                return true;
             }
         }
+        false
     }
 
     /// Passes the frame's notices on.
