@@ -4,7 +4,9 @@ use crate::app::{App, FrameBudget};
 use crate::bvh::Isa;
 use crate::first_look;
 use crate::image::{Display, ToneMap};
-use crate::load::{Card, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator};
+use crate::load::{
+    Card, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
+};
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform};
 use crate::sync::{Instructions, RenderOrigin};
 use crate::trace::{Film, Integrator, RenderSettings, Sampling};
@@ -173,9 +175,7 @@ fn choose_camera(
         let by_name = report.cameras.iter().find(|(name, _)| name == wanted);
         let by_number = || report.cameras.get(wanted.parse::<usize>().ok()?);
         let Some((_, camera)) = by_name.or_else(by_number) else {
-            let names: Vec<String> =
-                report.cameras.iter().enumerate().map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
-            let names = if names.is_empty() { "none of its own".to_owned() } else { names.join(", ") };
+            let names = choices(report.cameras.iter().map(|(name, _)| name.as_str()), "none of its own");
             return Err(OpenError::Camera { scene: scene.to_owned(), wanted: wanted.clone(), names });
         };
         world.insert_resource(ActiveCamera(*camera));

@@ -24,9 +24,9 @@ const TARGET: f64 = 0.014;
 const ANSWER: f64 = 0.03;
 /// ... but this in any case.
 const LEAST: f64 = 0.006;
-/// Of that, what is left to the preview in any case.
+/// Of [`Preview::target`], what is left to the preview in any case.
 const OWN: f64 = 0.35;
-/// A finer step is taken only if it is expected to need less than this part of [`TARGET`]: without the
+/// A finer step is taken only if it is expected to need less than this part of [`Preview::target`]: without the
 /// gap two steps would alternate.
 const HEADROOM: f64 = 0.7;
 /// Pixels of the picture along a pixel of the preview.
@@ -77,9 +77,10 @@ impl Preview {
         self.reserved = 0.5 * (self.reserved + time.as_secs_f64());
     }
 
-    /// Learns how long an answer took from the key to the screen, apart from preview and carrying over.
+    /// Learns how long an answer took from the key to the screen, apart from preview and carrying over. One that was late is
+    /// no rule.
     pub fn answered(&mut self, others: f64) {
-        self.others = 0.75 * self.others + 0.25 * others.max(0.0);
+        self.others = 0.75 * self.others + 0.25 * others.clamp(0.0, ANSWER);
     }
 
     /// Seconds for it and for what is carried over.

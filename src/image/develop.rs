@@ -161,7 +161,7 @@ pub fn develop_image(image: &LinearImage, display: &Display) -> Vec<u8> {
 #[inline(always)]
 fn srgb_level(linear: f32) -> f32 {
     const CURVE: [f32; 8] =
-        [-18.351_29, 95.965_385, -220.674_39, 300.220_73, -290.243_07, 371.246_55, 31.756_943, -14.920_92];
+        [-18.351_29, 95.965_385, -220.674_4, 300.220_73, -290.243_07, 371.246_55, 31.756_943, -14.920_92];
     let linear = linear.clamp(0.0, 1.0);
     let root = linear.sqrt().sqrt();
     let mut curve = CURVE[0];
@@ -198,6 +198,18 @@ mod tests {
                     "{radiance} {tone_map:?}: {bytes:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_black_and_alpha_is_full() {
+        // More than are developed side by side, and not a multiple of them.
+        let mut bytes = [1; 4 * 21];
+        let pixels: Vec<Vec4> =
+            (0..21).map(|i| if i % 2 == 0 { Vec4::NAN } else { Vec4::splat(f32::INFINITY) }).collect();
+        develop_linear(&pixels, UVec2::new(21, 1), &Display::default(), &mut bytes);
+        for (i, rgba) in bytes.chunks_exact(4).enumerate() {
+            assert_eq!(rgba, if i % 2 == 0 { [0, 0, 0, 255] } else { [255; 4] }, "pixel {i}");
         }
     }
 

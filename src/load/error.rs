@@ -117,3 +117,10 @@ impl LoadError {
         Self::Broken { file: file.to_owned(), place: place.to_string(), problem: problem.to_string() }
     }
 }
+
+/// `names` with their numbers, as the user may choose them; `none` if there are none.
+pub(crate) fn choices<'a>(names: impl IntoIterator<Item = &'a str>, none: &str) -> String {
+    let names: Vec<String> =
+        names.into_iter().enumerate().map(|(i, name)| format!("{i} \"{name}\"")).collect();
+    if names.is_empty() { none.to_owned() } else { names.join(", ") }
+}

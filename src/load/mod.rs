@@ -28,6 +28,7 @@ mod tangents;
 
 pub use builtin::{BuiltIn, built_in_scenes};
 pub use card::{Card, Verdict};
+pub(crate) use error::choices;
 pub use error::{LoadError, ReadError};
 pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use made::Made;
@@ -214,9 +215,7 @@ fn check_animation(file: &str, sink: &Sink<'_>) -> Result<(), LoadError> {
     if sink.world.get_resource::<Playing>().is_some_and(|playing| !playing.animations.is_empty()) {
         return Ok(());
     }
-    let all = sink.report.animations.iter().enumerate();
-    let names: Vec<String> = all.map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
-    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    let names = choices(sink.report.animations.iter().map(|(name, _)| name.as_str()), "none");
     Err(LoadError::NotThere { file: file.to_owned(), kind: "animation", wanted: wanted.clone(), names })
 }
 

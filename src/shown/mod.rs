@@ -5,7 +5,9 @@
 //! more samples the film has, the less the old ones count, and from [`FADE`] on it stands alone. In its first second
 //! it is also shown smoothed ([`smooth`]). Neither ever touches the film, nor a picture that is finished.
 
+mod aim;
 mod carry;
+mod grid;
 mod smooth;
 
 use crate::app::{FrameBudget, FrameStats};
@@ -65,12 +67,14 @@ pub struct Shown {
     kept: Vec<Vec4>,
     /// Whether the last picture was `kept` itself, and `cells` is an older one.
     is_kept: bool,
+    /// Whether all of the last picture is seen from `viewpoint`.
+    is_whole: bool,
     /// Share of the pixels that are in `kept` with old samples; 0: it holds nothing.
     share: f64,
     /// Seconds that carrying over and developing took, the last time.
     pub seconds: [f64; 2],
     /// How much one can look at in time.
-    pace: carry::Pace,
+    pace: grid::Pace,
     /// To be overwritten.
     spare: Vec<Spot>,
 }
@@ -81,6 +85,8 @@ impl Shown {
         self.viewpoint = None;
         self.share = 0.0;
         self.exact_rows = 0;
+        (self.is_kept, self.is_whole) = (false, false);
+        self.seconds[0] = 0.0;
     }
 
     /// Share of the pixels that show old samples, in 0..=1, beside a film of so many samples per pixel.
@@ -142,7 +148,7 @@ impl Shown {
                     (0..width).map(|x| Vec2::new(x as f32 + 0.5, y as f32 + 0.5)).collect();
                 places(scene, &middles, row);
             });
-            carry::note(&mut self.pace.place, start.elapsed().as_secs_f64(), (last - first) * width);
+            grid::note(&mut self.pace.place, start.elapsed().as_secs_f64(), (last - first) * width);
             // A row's edges are known when the one below is.
             let sheet = scene.viewpoint.sheet(self.size);
             let known = if last == height { height } else { last - 1 };
@@ -186,6 +192,7 @@ impl Shown {
         self.is_kept =
             self.share > 0.0 && self.kept.len() == count && fade == 1.0 && film.mean_samples() == 0.0;
         if self.is_kept {
+            self.is_whole = true;
             return;
         }
         self.cells.resize(count, Vec4::ZERO);
@@ -214,7 +221,8 @@ impl Shown {
             }
         });
         // Half of it may be of another view.
-        self.is_kept = was_kept && !keep_going();
+        self.is_kept = was_kept && self.share > 0.0 && !keep_going();
+        self.is_whole |= keep_going();
     }
 }
 
@@ -263,7 +271,8 @@ pub fn keep(
     if stats.begun {
         shown.began = stats.trace_seconds;
         // What a lens shows of a point, it shows from there only.
-        let can_carry = !is_other && !scene.viewpoint.has_lens() && shown.size == film.size();
+        let can_carry =
+            !is_other && shown.is_whole && !scene.viewpoint.has_lens() && shown.size == film.size();
         if can_carry && shown.viewpoint.is_some_and(|old| !old.has_lens()) {
             let start = Instant::now();
             let seconds = CARRYING * preview.target();
@@ -288,8 +297,7 @@ pub fn develop_film(
     preview: Res<Preview>,
     display: Res<Display>,
     (viewpoint, settings): (Res<Viewpoint>, Res<RenderSettings>),
-    stats: Res<FrameStats>,
-    budget: Res<FrameBudget>,
+    (stats, budget): (Res<FrameStats>, Res<FrameBudget>),
     mut shown: ResMut<Shown>,
     mut picture: ResMut<Picture>,
     mut is_late: Local<bool>,
@@ -322,4 +330,31 @@ pub fn develop_film(
     develop_linear(cells, shown.size, &display, &mut picture.rgba);
     picture.version += 1;
     shown.seconds[1] = start.elapsed().as_secs_f64();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_that_is_broken_off_is_not_taken_for_one_of_its_view() {
+        let film = Film::new(UVec2::splat(4), 0);
+        let old = vec![Vec4::splat(5.0); 16];
+        let mut shown = Shown { size: film.size(), share: 1.0, kept: old.clone(), ..Shown::default() };
+        shown.compose(&film, None, 1.0, || true);
+        assert!(shown.is_whole);
+        assert_eq!(shown.cells(), old, "nothing but what was carried over");
+        // There are samples now, and somebody asks for another picture.
+        shown.compose(&film, None, 0.5, || false);
+        assert!(shown.is_whole);
+        assert_eq!(shown.cells(), old, "still that");
+        shown.compose(&film, None, 0.5, || true);
+        assert_eq!(shown.cells()[3].w, 2.5);
+        shown.forget();
+        shown.compose(&film, None, 1.0, || false);
+        assert!(!shown.is_whole, "some of it is older");
+        shown.compose(&film, None, 1.0, || true);
+        assert!(shown.is_whole);
+        assert_eq!(shown.cells(), [Vec4::ZERO; 16]);
+    }
 }

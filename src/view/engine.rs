@@ -220,8 +220,9 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 && !app.world.resource::<Pending>().0;
             self.say(app);
             self.publish(app, version, moving, asked);
-            if moving
-                && self.await_presented(app.world.resource::<Picture>().version)
+            let shown = app.world.resource::<Picture>().version;
+            if self.await_presented(shown, moving)
+                && shown != version
                 && let Some(asked) = asked
             {
                 let known = app.world.resource::<FrameStats>().preview_seconds
@@ -311,12 +312,16 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
 
     /// Where presenting takes time from tracing, one after the other: together each would only take longer, and the picture
     /// that somebody waits for would come later. Whether it has been seen to be presented.
-    fn await_presented(&self, version: u64) -> bool {
+    fn await_presented(&self, version: u64, moving: bool) -> bool {
         let Some(presented) = &self.presented else { return false };
+        if !moving {
+            presented.try_iter().for_each(drop);
+            return false;
+        }
         let until = Instant::now() + PRESENTING;
         // If none comes, the window is hidden or slow.
         while let Ok(other) = presented.recv_timeout(until.saturating_duration_since(Instant::now())) {
-            if other >= version {
+            if other == version {
                 return true;
             }
         }

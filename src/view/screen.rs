@@ -53,24 +53,18 @@ impl Screen {
             .map_err(|e| format!("cannot open a window: {}", without_place(&e.to_string())))?;
         let window = Arc::new(window);
         let size = vector(window.inner_size()).max(UVec2::ONE);
-        let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(&window));
-        // wgpu panics if WGPU_ADAPTER_NAME matches nothing.
-        let mut pixels = quietly(|| Pixels::new(size.x, size.y, surface))
-            .map_err(|panic| format!("no graphics adapter: {panic}"))?
-            .map_err(|e| {
-                format!("no graphics adapter (Vulkan or GL) can draw into the window: {}", with_sources(&e))
-            })?;
+        let mut pixels = build(&window, size, |builder| builder)?;
         let software = pixels.adapter().get_info().device_type == DeviceType::Cpu;
         if software && let Some(format) = plain_format(&pixels) {
             // One surface for each window.
             drop(pixels);
-            let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(&window));
-            pixels = PixelsBuilder::new(size.x, size.y, surface)
-                .texture_format(TextureFormat::Rgba8Unorm)
-                .surface_texture_format(format)
-                .present_mode(PresentMode::Mailbox)
-                .build()
-                .map_err(|e| format!("the software adapter fails: {}", with_sources(&e)))?;
+            let plain = build(&window, size, |builder| {
+                builder
+                    .texture_format(TextureFormat::Rgba8Unorm)
+                    .surface_texture_format(format)
+                    .present_mode(PresentMode::Mailbox)
+            });
+            pixels = plain.or_else(|_| build(&window, size, |builder| builder))?;
         }
         let device_error = Arc::new(Mutex::new(None));
         let seen = Arc::clone(&device_error);
@@ -101,7 +95,10 @@ impl Screen {
     /// Lets `paint` write sRGB bytes of [`Screen::size`] pixels, and shows them.
     pub fn draw(&mut self, paint: impl FnOnce(&mut [u8], UVec2)) -> Presented {
         paint(self.pixels.frame_mut(), self.size);
-        self.window.pre_present_notify();
+        if !self.software {
+            // It makes the next picture wait for the display, and the engine for that picture.
+            self.window.pre_present_notify();
+        }
         let outcome = self.pixels.render();
         let device_error = lock(&self.device_error).take();
         became(outcome, device_error, &mut self.failures)
@@ -117,6 +114,23 @@ impl Screen {
         let full = self.window.fullscreen().is_none().then_some(Fullscreen::Borderless(None));
         self.window.set_fullscreen(full);
     }
+}
+
+type Builder = PixelsBuilder<'static, 'static, 'static, Arc<Window>>;
+
+/// What draws into the window, as `set` has it.
+fn build(
+    window: &Arc<Window>,
+    size: UVec2,
+    set: impl FnOnce(Builder) -> Builder,
+) -> Result<Pixels<'static>, String> {
+    let surface = SurfaceTexture::new(size.x, size.y, Arc::clone(window));
+    // wgpu panics if WGPU_ADAPTER_NAME matches nothing.
+    quietly(|| set(PixelsBuilder::new(size.x, size.y, surface)).build())
+        .map_err(|panic| format!("no graphics adapter: {panic}"))?
+        .map_err(|e| {
+            format!("no graphics adapter (Vulkan or GL) can draw into the window: {}", with_sources(&e))
+        })
 }
 
 /// A format of the surface that takes our bytes as they are: an adapter on the CPU is not to make light of

@@ -25,7 +25,7 @@ mod texture;
 mod vertices;
 
 use super::budget::Budget;
-use super::error::LoadError;
+use super::error::{LoadError, choices};
 use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder, without_bom};
@@ -182,9 +182,7 @@ impl Document<'_> {
         let by_name = list.iter().find(|(name, _)| name == wanted);
         let by_number = || list.get(wanted.parse::<usize>().ok()?);
         by_name.or_else(by_number).map(|&(_, value)| value).ok_or_else(|| {
-            let names: Vec<String> =
-                list.iter().enumerate().map(|(i, (name, _))| format!("{i} \"{name}\"")).collect();
-            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let names = choices(list.iter().map(|(name, _)| name.as_str()), "none");
             LoadError::NotThere { file: self.file.to_owned(), kind, wanted: wanted.to_owned(), names }
         })
     }

@@ -26,13 +26,21 @@ pub const TILE: u32 = 8;
 pub struct Film {
     size: UVec2,
     first_sample: u32,
-    /// Samples of each pixel from which on [`Film::allot`] gives out shares; 0 if it does not.
-    even_samples: u32,
-    /// See [`Film::allot_first`].
-    has_first_shares: bool,
+    stage: Stage,
     /// See [`Film::confine`].
     region: Option<[UVec2; 2]>,
     tiles: Vec<Tile>,
+}
+
+/// Which pixels get how many of the next samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// All as many.
+    Even,
+    /// After so many of each, shares that end: see [`Film::allot_first`].
+    FirstShares(u32),
+    /// After so many of each, shares for good: see [`Film::allot`].
+    Shares(u32),
 }
 
 impl Film {
@@ -63,13 +71,13 @@ impl Film {
                 }
             })
             .collect();
-        Self { size, first_sample, even_samples: 0, has_first_shares: false, region: None, tiles }
+        Self { size, first_sample, stage: Stage::Even, region: None, tiles }
     }
 
     /// Forgets all samples, in no time: a tile is cleared when it is next worked on.
     pub fn reset(&mut self) {
         let first_sample = self.first_sample;
-        (self.even_samples, self.has_first_shares) = (0, false);
+        self.stage = Stage::Even;
         for tile in &mut self.tiles {
             tile.early.clear();
             tile.next_sample = first_sample;
@@ -192,8 +200,8 @@ impl Film {
     /// Begins to give out shares, whole numbers of samples, after [`Film::keep_early`] by what that has kept. When
     /// [`Film::end_first_shares`] ends it, each pixel has as many as it must have for [`Film::allot`].
     pub fn allot_first(&mut self, shares: &[f32]) {
+        self.stage = Stage::FirstShares(self.complete_samples());
         self.give_shares(shares);
-        self.has_first_shares = true;
     }
 
     /// Ends what [`Film::allot_first`] began, if all tiles have come so far, also those that rest now. Samples beyond are
@@ -202,7 +210,7 @@ impl Film {
         if !self.tiles.iter().all(|tile| tile.complete == EVEN) {
             return false;
         }
-        (self.even_samples, self.has_first_shares) = (0, false);
+        self.stage = Stage::Even;
         for tile in &mut self.tiles {
             tile.next_sample += EVEN - 1;
             tile.more.iter_mut().for_each(|more| *more -= EVEN - 1);
@@ -213,7 +221,7 @@ impl Film {
     /// Whether shares by the first sample of each pixel are being given out. Some pixels may have no other.
     #[must_use]
     pub fn has_first_shares(&self) -> bool {
-        self.has_first_shares
+        matches!(self.stage, Stage::FirstShares(_))
     }
 
     /// Means of both halves of each pixel, as far as they have samples, and of all; by the first [`EVEN`] samples if they are
@@ -238,12 +246,13 @@ impl Film {
     /// A picture stays unbiased only if how many samples a pixel gets does not depend on what they say: so
     /// the share of one pixel is to be found from others.
     pub fn allot(&mut self, shares: &[f32]) {
+        self.stage = Stage::Shares(self.complete_samples());
         self.give_shares(shares);
         self.tiles.iter_mut().for_each(|tile| tile.early = Vec::new());
     }
 
     fn give_shares(&mut self, shares: &[f32]) {
-        self.even_samples = self.complete_samples();
+        let even = self.even_samples();
         debug_assert!(!self.tiles.iter().any(Tile::is_half), "a half tile has no even number of samples");
         let across = self.size.x as usize;
         for tile in &mut self.tiles {
@@ -252,20 +261,23 @@ impl Film {
             tile.shares.clear();
             tile.shares.extend((y..y + height).flat_map(|y| &shares[y * across + x..][..width]));
             tile.more.resize(width * height, 0);
-            tile.complete = self.even_samples;
+            tile.complete = even;
         }
     }
 
     /// Whether shares have been given out, be it first ones.
     #[must_use]
     pub fn is_allotted(&self) -> bool {
-        self.even_samples > 0
+        self.stage != Stage::Even
     }
 
     /// Samples that each pixel had before [`Film::allot`]; 0 without it.
     #[must_use]
     pub fn even_samples(&self) -> u32 {
-        self.even_samples
+        match self.stage {
+            Stage::Even => 0,
+            Stage::FirstShares(even) | Stage::Shares(even) => even,
+        }
     }
 
     /// Samples that every pixel has its share of.

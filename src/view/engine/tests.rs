@@ -1,6 +1,7 @@
 //! The engine without a window.
 
 use super::super::input::Press;
+use super::super::keymap::Hold;
 use super::*;
 use crate::app::FrameSystems;
 use crate::load::LoadOptions;
@@ -8,6 +9,7 @@ use crate::open::{Wishes, open};
 use bevy_ecs::prelude::{IntoScheduleConfigs, Res};
 use glam::UVec2;
 use std::sync::mpsc::channel;
+use std::thread::JoinHandle;
 
 /// Raises the interrupt in every frame that a key changes, as a window does that is slow to raise it after its command.
 fn raise_late(input: Res<Input>, budget: Res<FrameBudget>) {
@@ -16,8 +18,8 @@ fn raise_late(input: Res<Input>, budget: Res<FrameBudget>) {
     }
 }
 
-#[test]
-fn an_interrupt_that_comes_late_keeps_no_picture_back() {
+/// An engine with two samples of the Cornell box, small.
+fn small(presented: Option<Receiver<u64>>) -> (Sender<Command>, Arc<Mutex<Published>>, JoinHandle<()>) {
     let (commands, received) = channel();
     let published = Arc::new(Mutex::new(Published::default()));
     let engine = Engine {
@@ -27,7 +29,7 @@ fn an_interrupt_that_comes_late_keeps_no_picture_back() {
         own: commands.clone(),
         interrupt: Arc::default(),
         published: Arc::clone(&published),
-        presented: None,
+        presented,
         wake: |_| (),
     };
     let engine = std::thread::spawn(move || {
@@ -40,6 +42,30 @@ fn an_interrupt_that_comes_late_keeps_no_picture_back() {
             Ok(app)
         });
     });
+    (commands, published, engine)
+}
+
+#[test]
+fn a_window_that_presents_nothing_does_not_stop_the_engine() {
+    let (silent, presented) = channel();
+    let (commands, published, engine) = small(Some(presented));
+    let mut held = [false; Hold::COUNT];
+    held[Hold::Forward as usize] = true;
+    commands.send(Command::Held { held, at: Instant::now() }).unwrap();
+    let (start, mut versions) = (Instant::now(), 0);
+    while versions < 5 && start.elapsed() < Duration::from_secs(20) {
+        versions += u32::from(lock(&published).picture.take().is_some());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert_eq!(versions, 5);
+    drop(silent);
+    commands.send(Command::Quit).unwrap();
+    engine.join().unwrap();
+}
+
+#[test]
+fn an_interrupt_that_comes_late_keeps_no_picture_back() {
+    let (commands, published, engine) = small(None);
     // The picture as soon as all samples are there and `is_wanted`.
     let wait = |is_wanted: &dyn Fn(&[u8]) -> bool| {
         let start = Instant::now();
