@@ -21,7 +21,7 @@ pub struct Preview {
 /// Seconds that a preview may take, with what is carried over from the picture before, ...
 const TARGET: f64 = 0.014;
 /// ... less if an answer would take longer than this otherwise, ...
-const ANSWER: f64 = 0.03;
+const ANSWER: f64 = 0.029;
 /// ... but this in any case.
 const LEAST: f64 = 0.006;
 /// Of [`Preview::target`], what is left to the preview in any case.
@@ -134,7 +134,7 @@ mod tests {
         let mut slow = Preview { scale: 3, seconds_per_pixel: Some(0.1), ..Preview::default() };
         (0..20).for_each(|_| slow.answered(0.02));
         slow.choose_scale(1.0);
-        assert_eq!(slow.scale, 4, "where the rest of an answer takes 20 ms, 10 are left");
+        assert_eq!(slow.scale, 4, "where the rest of an answer takes 20 ms, 9 are left");
         let mut fixed = Preview { seconds_per_pixel: Some(1e9), ..Preview::at_scale(2) };
         fixed.choose_scale(1.0);
         assert_eq!(fixed.scale, 2, "unless told");

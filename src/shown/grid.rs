@@ -13,7 +13,7 @@ use std::time::Instant;
 const SIDES: [u32; 3] = [2, 4, 8];
 /// Of the time for carrying over, what looking may take before one knows where the edges are.
 const FIRST_LOOK: f64 = 0.6;
-/// Pixels along a row for which one looks once where there are edges, as there is time.
+/// Pixels along a row for which one looks once where there are edges, as there is time; for the last in any case.
 const STEPS: [u32; 3] = [1, 2, 4];
 
 /// What carrying over costs on this machine in this scene.
@@ -39,7 +39,7 @@ pub struct Grid<'a> {
     pub size: UVec2,
     /// What is in the middle of each.
     blocks: Vec<Place>,
-    /// Blocks that see an edge are looked at anew along each row, once for so many pixels; 0: they are not.
+    /// Blocks that see an edge are looked at anew along each row, once for so many pixels.
     pub step: u32,
     /// How many looks that takes.
     pub exact: f64,
@@ -97,9 +97,10 @@ impl<'a> Grid<'a> {
             preview.map_or(0.0, |film| film.size().element_product() as f32 / full.element_product() as f32);
         let at_edges = count as f64 * pixels / blocks.len() as f64;
         let place = pace.place.unwrap_or(FIRST_GUESS);
-        let step = STEPS.into_iter().find(|&step| at_edges / f64::from(step) * place <= left).unwrap_or(0);
-        let exact = if step > 0 { at_edges / f64::from(step) } else { 0.0 };
-        Self { size, step, exact, blocks, preview, worth }
+        let looks = |step: u32| at_edges / f64::from(step);
+        let [.., coarsest] = STEPS;
+        let step = STEPS.into_iter().find(|&step| looks(step) * place <= left).unwrap_or(coarsest);
+        Self { size, step, exact: looks(step), blocks, preview, worth }
     }
 
     /// Pixels of block column `u` of a row of `width`.
