@@ -70,17 +70,20 @@ fn carry_row(
     let row = Row::new(new, &old.sheet, y as f32 + 0.5);
     let v = y * grid.size.y / old.size.y;
     let span = |u: u32| grid.span(u, old.size.x);
-    let edges = (0..grid.size.x).filter(|&u| grid.at(u, v).edge);
-    let starts = edges.flat_map(|u| span(u).step_by(grid.step as usize));
-    let half = 0.5 * grid.step as f32;
-    let middles: Vec<Vec2> = starts.map(|x| Vec2::new(x as f32 + half, y as f32 + 0.5)).collect();
-    let mut exact = vec![Place::unknown(); middles.len()];
-    places(scene, &middles, &mut exact);
+    let mut exact = Vec::new();
+    if let Some(step) = grid.step {
+        let edges = (0..grid.size.x).filter(|&u| grid.at(u, v).edge);
+        let starts = edges.flat_map(|u| span(u).step_by(step as usize));
+        let half = 0.5 * step as f32;
+        let middles: Vec<Vec2> = starts.map(|x| Vec2::new(x as f32 + half, y as f32 + 0.5)).collect();
+        exact.resize(middles.len(), Place::unknown());
+        places(scene, &middles, &mut exact);
+    }
     let mut exact = exact.into_iter();
     let mut runs: Vec<Run> = Vec::with_capacity(grid.size.x as usize);
     for u in 0..grid.size.x {
         let block = grid.at(u, v);
-        let stride = if block.edge { grid.step } else { RUN as u32 };
+        let stride = grid.step.filter(|_| block.edge).unwrap_or(RUN as u32);
         for x in span(u).step_by(stride as usize) {
             let place = if block.edge { exact.next().unwrap_or(*block) } else { *block };
             let end = (x + stride).min(span(u).end);

@@ -13,8 +13,10 @@ use std::time::Instant;
 const SIDES: [u32; 3] = [2, 4, 8];
 /// Of the time for carrying over, what looking may take before one knows where the edges are.
 const FIRST_LOOK: f64 = 0.6;
-/// Pixels along a row for which one looks once where there are edges, as there is time; for the last in any case.
+/// Pixels along a row for which one looks once where there are edges, as there is time, ...
 const STEPS: [u32; 3] = [1, 2, 4];
+/// ... or somewhat less, as a share of the time for carrying over: without, thin things fall apart.
+const OVERTIME: f64 = 0.25;
 
 /// What carrying over costs on this machine in this scene.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,8 +41,8 @@ pub struct Grid<'a> {
     pub size: UVec2,
     /// What is in the middle of each.
     blocks: Vec<Place>,
-    /// Blocks that see an edge are looked at anew along each row, once for so many pixels.
-    pub step: u32,
+    /// Blocks that see an edge are looked at anew along each row, once for so many pixels, if there is time.
+    pub step: Option<u32>,
     /// How many looks that takes.
     pub exact: f64,
     preview: Option<&'a Film>,
@@ -73,9 +75,9 @@ impl<'a> Grid<'a> {
                 (0..size.x).map(|x| (Vec2::new(x as f32, y as f32) + 0.5) * pitch).collect();
             places(scene, &middles, row);
         });
-        let seconds = start.elapsed().as_secs_f64();
-        left -= seconds;
-        note(&mut pace.place, seconds, blocks.len());
+        let took = start.elapsed().as_secs_f64();
+        left -= took;
+        note(&mut pace.place, took, blocks.len());
         // Planes must go on from block to block.
         let mut edges = vec![false; blocks.len()];
         edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
@@ -99,8 +101,11 @@ impl<'a> Grid<'a> {
         let place = pace.place.unwrap_or(FIRST_GUESS);
         let looks = |step: u32| at_edges / f64::from(step);
         let [.., coarsest] = STEPS;
-        let step = STEPS.into_iter().find(|&step| looks(step) * place <= left).unwrap_or(coarsest);
-        Self { size, step, exact: looks(step), blocks, preview, worth }
+        let fits = |step: u32, left: f64| (looks(step) * place <= left).then_some(step);
+        let step = STEPS.into_iter().find_map(|step| fits(step, left));
+        let step = step.or(fits(coarsest, left.max(0.0) + OVERTIME * seconds));
+        let exact = step.map_or(0.0, looks);
+        Self { size, step, exact, blocks, preview, worth }
     }
 
     /// Pixels of block column `u` of a row of `width`.
