@@ -43,14 +43,6 @@ pub struct Spot {
 impl Spot {
     /// Not looked at yet.
     pub const UNKNOWN: Self = Self { position: Vec3::ZERO, thing: Place::UNKNOWN, facet: [0; 3], keeps: 0 };
-
-    /// Unit geometric normal toward the eye.
-    #[inline(always)]
-    #[must_use]
-    pub fn facet(&self) -> Vec3 {
-        let [x, y, z] = self.facet;
-        Vec3::new(f32::from(x), f32::from(y), f32::from(z)) * (1.0 / 127.0)
-    }
 }
 
 impl From<&Place> for Spot {
