@@ -268,3 +268,28 @@ fn a_check_says_how_files_fare_and_ends_with_the_worst() {
     );
     assert!(cards[1]["error"].as_str().unwrap().contains("bad.obj: line 2: index out of range"));
 }
+
+#[test]
+fn the_manual_has_a_page_for_each_command_with_all_its_flags() {
+    let folder = fresh("man");
+    let (code, page, _) = run("man", &["man"]);
+    assert!(code == Some(0) && page.contains("penumbra\\-render"), "{page}");
+    assert_eq!(run("man", &["man", "share/man1"]).0, Some(0));
+    for (name, flags) in [
+        ("penumbra", vec!["resolution", "replay"]),
+        ("penumbra-render", vec!["from", "hdri", "noise"]),
+        ("penumbra-merge", vec!["allow-gaps"]),
+        ("penumbra-report", vec!["quick"]),
+        ("penumbra-torture", vec!["open-edge"]),
+        ("penumbra-check", vec!["gltf-scene"]),
+    ] {
+        let page = std::fs::read_to_string(folder.join(format!("share/man1/{name}.1"))).unwrap();
+        for flag in flags {
+            let written = format!("\\-\\-{}", flag.replace('-', "\\-"));
+            assert!(page.contains(&written), "{name}: {written} in {page}");
+        }
+    }
+    std::fs::write(folder.join("file"), "").unwrap();
+    let (code, _, said) = run("man", &["man", "file"]);
+    assert!(code == Some(1) && said.contains("file"), "{said}");
+}

@@ -51,8 +51,8 @@ pub enum Command {
     Torture(TortureArgs),
     /// Print a script that completes commands in a shell: penumbra completions bash > FILE
     Completions(CompletionsArgs),
-    /// Print the manual page: penumbra man > penumbra.1
-    Man,
+    /// Print the manual page, or write those of all commands into a folder: penumbra man share/man/man1
+    Man(ManArgs),
 }
 
 /// Arguments of the window.
@@ -160,6 +160,14 @@ pub struct MergeArgs {
 pub struct CompletionsArgs {
     /// Whose
     pub shell: clap_complete::Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// Folder for penumbra.1, penumbra-render.1 and so on; it is made if need be [default: print penumbra.1]
+    #[arg(value_name = "DIR")]
+    pub folder: Option<PathBuf>,
 }
 
 #[cfg(test)]

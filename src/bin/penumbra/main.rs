@@ -14,6 +14,7 @@ mod window;
 use clap::{CommandFactory, Parser};
 use penumbra::cli::{Cli, Command};
 use penumbra::load::built_in_scenes;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Pictures come in changing sizes for hours: glibc's allocator keeps most of what was freed between them.
@@ -34,7 +35,7 @@ fn main() -> ExitCode {
             clap_complete::generate(args.shell, &mut Cli::command(), "penumbra", &mut std::io::stdout());
             0
         }
-        Some(Command::Man) => manual(),
+        Some(Command::Man(args)) => manual(args.folder.as_deref()),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
@@ -52,7 +53,15 @@ fn main() -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Prints the manual page. Whoever closed standard output does not want to read it.
-fn manual() -> u8 {
-    u8::from(clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout()).is_err())
+/// Prints the manual page of the program, or writes that of each command into `folder`.
+fn manual(folder: Option<&Path>) -> u8 {
+    let Some(folder) = folder else {
+        // Whoever closed standard output does not want to read it.
+        return u8::from(clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout()).is_err());
+    };
+    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
+    match written {
+        Ok(()) => 0,
+        Err(error) => exit::because(&format!("{}: {error}", folder.display()), exit::FAILED),
+    }
 }
