@@ -1,14 +1,40 @@
 //! The keyboard: which keys are down, and what a press does at once.
 
 use super::input::{Command, Press};
-use super::keymap::{Action, Hold, Tap, is_modifier};
+use super::keymap::{Action, Entry, Hold, Keymap, Tap, is_modifier};
 use super::replay::Event;
 use super::ui::open::{Prompt, Typed};
 use super::window::Viewer;
+use std::collections::HashMap;
 use std::time::Instant;
 use winit::event::{ElementState, KeyEvent};
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::{Key, KeyCode, PhysicalKey};
+
+/// The keys that are down and held for something. What one means is decided when it goes down, by the modifiers that are
+/// down then, and stays until it goes up.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Down(HashMap<KeyCode, Hold>);
+
+impl Down {
+    /// What is held, by [`Hold`].
+    fn held(&self) -> [bool; Hold::COUNT] {
+        let mut held = [false; Hold::COUNT];
+        for &hold in self.0.values() {
+            held[hold as usize] = true;
+        }
+        held
+    }
+
+    /// What `code` means when it goes down now; nothing if it is down and held already.
+    fn meaning(&self, code: KeyCode, keys: &Keymap) -> Option<Entry> {
+        if self.0.contains_key(&code) {
+            return None;
+        }
+        let [control, shift] = [Hold::Control, Hold::Fast].map(|hold| self.held()[hold as usize]);
+        keys.lookup(code, control, shift)
+    }
+}
 
 impl Viewer {
     pub(super) fn key(&mut self, event_loop: &ActiveEventLoop, event: &KeyEvent, is_synthetic: bool) {
@@ -51,18 +77,17 @@ impl Viewer {
         is_synthetic: bool,
     ) {
         if !pressed {
-            self.keys.remove(&code);
+            self.keys.0.remove(&code);
             return self.hold();
         }
-        let [control, shift] = [Hold::Control, Hold::Fast].map(|hold| self.held[hold as usize]);
-        let Some(entry) = self.options.keys.lookup(code, control, shift) else {
+        let Some(entry) = self.keys.meaning(code, &self.options.keys) else {
             return;
         };
         match entry.action {
             // Keys that are down when the window gets the focus were meant for somebody else.
             action if is_synthetic && !is_modifier(action) => {}
-            Action::Hold(_) => {
-                self.keys.insert(code);
+            Action::Hold(hold) => {
+                self.keys.0.insert(code, hold);
                 self.hold();
             }
             Action::Tap(_) if repeat && !entry.repeats => {}
@@ -72,14 +97,7 @@ impl Viewer {
 
     /// Tells the engine what is held, if that is something else than before.
     pub(super) fn hold(&mut self) {
-        let mut held = [false; Hold::COUNT];
-        for code in &self.keys {
-            if let Some(Action::Hold(hold)) =
-                self.options.keys.lookup(*code, false, false).map(|entry| entry.action)
-            {
-                held[hold as usize] = true;
-            }
-        }
+        let held = self.keys.held();
         if held != self.held {
             self.held = held;
             self.send(Command::Held { held, at: Instant::now() });
@@ -121,8 +139,47 @@ impl Viewer {
     }
 
     pub(super) fn leave(&mut self) {
-        self.keys.clear();
+        self.keys.0.clear();
         self.hold();
         self.end_drag();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::keys_file::parse;
+    use super::*;
+    use KeyCode::{ControlLeft, KeyQ, KeyS, KeyW, ShiftLeft};
+
+    /// What is held for something after these keys went down (true) or up, beside Ctrl and Shift.
+    fn held(keys: &Keymap, events: &[(KeyCode, bool)]) -> Vec<usize> {
+        let mut down = Down::default();
+        for &(code, pressed) in events {
+            if !pressed {
+                down.0.remove(&code);
+            } else if let Some(Action::Hold(hold)) = down.meaning(code, keys).map(|entry| entry.action) {
+                down.0.insert(code, hold);
+            }
+        }
+        let held = down.held();
+        (0..Hold::COUNT).filter(|&i| held[i] && i != Hold::Control as usize && i != Hold::Fast as usize).collect()
+    }
+
+    #[test]
+    fn what_is_bound_with_a_modifier_is_held_with_it_and_until_its_key_goes_up() {
+        let keys = parse("forward = 'Ctrl+W'\nback = 'Shift+S'").unwrap();
+        let (forward, back) = (Hold::Forward as usize, Hold::Back as usize);
+        assert_eq!(held(&keys, &[(KeyW, true)]), []);
+        assert_eq!(held(&keys, &[(ControlLeft, true), (KeyW, true)]), [forward]);
+        assert_eq!(held(&keys, &[(ControlLeft, true), (KeyW, true), (ControlLeft, false)]), [forward]);
+        assert_eq!(held(&keys, &[(ControlLeft, true), (KeyW, true), (KeyW, false)]), []);
+        assert_eq!(held(&keys, &[(ShiftLeft, true), (KeyS, true)]), [back]);
+    }
+
+    #[test]
+    fn a_modifier_that_comes_later_changes_nothing() {
+        let keys = Keymap::default();
+        assert_eq!(held(&keys, &[(KeyW, true), (ControlLeft, true), (KeyW, true)]), [Hold::Forward as usize]);
+        assert_eq!(held(&keys, &[(ControlLeft, true), (KeyQ, true)]), [], "that is another thing");
     }
 }

@@ -43,7 +43,7 @@ pub fn read(path: Option<&Path>) -> Result<Keymap, String> {
     }
 }
 
-fn parse(text: &str) -> Result<Keymap, String> {
+pub(super) fn parse(text: &str) -> Result<Keymap, String> {
     let line = |offset: usize| text.bytes().take(offset).filter(|&byte| byte == b'\n').count() + 1;
     let table: BTreeMap<Spanned<String>, Spanned<Keys>> = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(1, |span| line(span.start));

@@ -5,6 +5,7 @@ use super::debug::layer::Layer;
 use super::engine::{Engine, Published, Wake};
 use super::input::{Command, Drag};
 use super::keymap::Hold;
+use super::keys::Down;
 use super::screen::{Screen, vector};
 use super::status::Status;
 use super::ui::Ui;
@@ -13,7 +14,7 @@ use crate::app::App;
 use crate::image::Picture;
 use crate::load::Watcher;
 use glam::{DVec2, UVec2};
-use std::collections::{HashSet, VecDeque};
+use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -24,7 +25,6 @@ use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalPosition;
 use winit::event::{DeviceEvent, DeviceId, ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
-use winit::keyboard::KeyCode;
 use winit::window::WindowId;
 
 /// A resize storm reaches the engine after this pause in it, ...
@@ -47,7 +47,7 @@ pub struct Viewer {
     pub(super) screen: Option<Screen>,
     pub(super) engine: Option<Link>,
     pub(super) failure: Option<ViewError>,
-    pub(super) keys: HashSet<KeyCode>,
+    pub(super) keys: Down,
     pub(super) held: [bool; Hold::COUNT],
     /// What the mouse does, and where it began.
     pub(super) drag: Option<(Drag, PhysicalPosition<f64>)>,
@@ -124,7 +124,7 @@ impl Viewer {
             screen: None,
             engine: None,
             failure: None,
-            keys: HashSet::new(),
+            keys: Down::default(),
             held: [false; Hold::COUNT],
             drag: None,
             dragged: false,
