@@ -104,7 +104,9 @@ pub struct Opened {
 /// If the scene cannot be loaded or has no such camera.
 pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Result<Opened, OpenError> {
     let start = Instant::now();
-    let (mut app, mut report) = App::open(source, options, RenderSettings::default())?;
+    let resolution = options.resolution.or(wishes.size.map(|size| size.to_array()));
+    let mut options = LoadOptions { resolution, ..options.clone() };
+    let (mut app, mut report) = App::open(source, &options, RenderSettings::default())?;
     let file = &report.render;
     let default = RenderSettings::default();
     let settings = RenderSettings {
@@ -128,7 +130,9 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     };
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);
-    app.world.insert_resource(SceneOrigin { source: source.clone(), options: options.clone() });
+    // Loaded again in a window of another shape, a camera of our own stands where it stood.
+    options.resolution = Some(settings.size.to_array());
+    app.world.insert_resource(SceneOrigin { source: source.clone(), options });
     if let Some(origin) = report.render.origin {
         app.world.insert_resource(RenderOrigin(Some(origin.into())));
     }

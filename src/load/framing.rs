@@ -205,12 +205,15 @@ fn frame(file: &str, survey: &Survey, bounds: &Box3, ball: SceneBounds, sink: &m
     let view = Transform::looking_at(back, DVec3::ZERO, DVec3::Y).0.matrix3;
     let vertical_fov = 40.0_f64.to_radians();
     let slope = 0.95 * (0.5 * vertical_fov).tan();
+    // Narrow pictures show less across.
+    let size = sink.options.resolution.or(sink.report.render.resolution);
+    let across = slope * size.map_or(1.0, |[w, h]| f64::from(w.max(1)) / f64::from(h.max(1))).min(1.0);
     let half = 0.5 * (bounds.max - bounds.min);
     let corners = (0..8).map(|i| half * DVec3::new(sign(i, 1), sign(i, 2), sign(i, 4)));
     let distance = corners
         .map(|corner| {
             let seen = view.transpose() * corner;
-            seen.z + seen.x.abs().max(seen.y.abs()) / slope
+            seen.z + (seen.x.abs() / across).max(seen.y.abs() / slope)
         })
         .fold(ball.radius * 1e-3, f64::max);
     let transform = Transform::looking_at(ball.center + back * distance, ball.center, DVec3::Y);

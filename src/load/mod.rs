@@ -122,6 +122,8 @@ pub struct LoadOptions {
     pub edits: Option<String>,
     /// Which animation, by name or by number from 0, instead of the first and those of other things.
     pub animation: Option<String>,
+    /// Width and height of the picture that a camera of our own is to fit, instead of those of the settings file.
+    pub resolution: Option<[u32; 2]>,
 }
 
 /// Reads a scene into the world and derives its `GlobalTransform`s.

@@ -6,8 +6,9 @@ use super::input::Input;
 use super::keymap::{Side, Tap};
 use super::orbit::{Navigation, pivot_depth};
 use crate::scene::{ActiveCamera, Camera, Lens, Projection, SceneBounds, Transform};
+use crate::trace::RenderSettings;
 use bevy_ecs::prelude::*;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, UVec2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Which cameras of the file were looked through.
@@ -58,6 +59,7 @@ pub fn choose_camera(
 pub fn choose_side(
     input: Res<Input>,
     bounds: Option<Res<SceneBounds>>,
+    settings: Res<RenderSettings>,
     mut navigation: ResMut<Navigation>,
     mut cameras: Query<(&mut FlyCameraState, &mut Transform, &mut Camera), With<FlyCamera>>,
 ) {
@@ -70,7 +72,7 @@ pub fn choose_side(
                 Tap::FrameAll => {
                     let Some(bounds) = &bounds else { continue };
                     navigation.pivot = bounds.center;
-                    distance = frame(&mut camera, bounds.radius);
+                    distance = frame(&mut camera, bounds.radius, settings.size);
                     true
                 }
                 _ => continue,
@@ -82,12 +84,19 @@ pub fn choose_side(
     }
 }
 
-/// How far a camera must be from a ball of this radius to see it whole; a parallel projection is made fit.
-fn frame(camera: &mut Mut<Camera>, radius: f64) -> f64 {
+/// How far a camera must be from a ball of this radius to see it whole in a picture of this size; a parallel projection is
+/// made fit.
+fn frame(camera: &mut Mut<Camera>, radius: f64, size: UVec2) -> f64 {
+    let size = size.as_dvec2().max(DVec2::ONE);
+    // Of the picture's height: what a narrow one shows across.
+    let least = (size.x / size.y).min(1.0);
     match camera.projection {
-        Projection::Perspective { vertical_fov } => radius / (0.5 * f64::from(vertical_fov)).sin(),
+        Projection::Perspective { vertical_fov } => {
+            radius / (least * (0.5 * f64::from(vertical_fov)).tan()).atan().sin()
+        }
         Projection::Orthographic { .. } => {
-            camera.projection = Projection::Orthographic { height: 2.0 * radius as f32 };
+            let height = (2.0 * radius / least) as f32;
+            camera.projection = Projection::Orthographic { height };
             2.0 * radius
         }
     }
@@ -210,5 +219,30 @@ pub fn remember(
                 Some(Bookmark { camera: *camera, transform, lens: lens.copied(), pivot: navigation.pivot });
             notices.0.push(Notice::Text(format!("bookmark {number} set")));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_framed_ball_is_within_the_picture_whatever_its_shape() {
+        let mut world = World::new();
+        let vertical_fov = 0.7;
+        let camera = world.spawn(Camera { projection: Projection::Perspective { vertical_fov } }).id();
+        for size in [UVec2::new(1600, 900), UVec2::splat(500), UVec2::new(300, 900)] {
+            let mut camera = world.get_mut::<Camera>(camera).unwrap();
+            let distance = frame(&mut camera, 2.0, size);
+            // Where a line of sight touches the ball, its tangent is seen under this.
+            let reach = (2.0 / distance).asin().tan();
+            let half = (0.5 * f64::from(vertical_fov)).tan();
+            let across = half * f64::from(size.x) / f64::from(size.y);
+            assert!((reach - half.min(across)).abs() < 1e-9, "{size}: {reach}");
+        }
+        let mut camera = world.get_mut::<Camera>(camera).unwrap();
+        camera.projection = Projection::Orthographic { height: 1.0 };
+        frame(&mut camera, 2.0, UVec2::new(300, 900));
+        assert_eq!(camera.projection, Projection::Orthographic { height: 12.0 });
     }
 }

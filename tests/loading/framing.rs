@@ -4,13 +4,18 @@ use super::*;
 
 /// Whether the active camera sees a point, in a square picture.
 fn sees(world: &World, point: DVec3) -> bool {
+    sees_within(world, point, 1.0)
+}
+
+/// Whether the active camera sees a point, in a picture that is `aspect` times as wide as high.
+fn sees_within(world: &World, point: DVec3, aspect: f64) -> bool {
     let camera = world.resource::<ActiveCamera>().0;
     let local = world.get::<GlobalTransform>(camera).unwrap().0.inverse().transform_point3(point);
     let Projection::Perspective { vertical_fov } = world.get::<Camera>(camera).unwrap().projection else {
         return false;
     };
     let reach = f64::from(vertical_fov / 2.0).tan() * -local.z;
-    local.z < 0.0 && local.x.abs() <= reach && local.y.abs() <= reach
+    local.z < 0.0 && local.x.abs() <= reach * aspect && local.y.abs() <= reach
 }
 
 #[test]
@@ -82,4 +87,22 @@ fn a_large_floor_does_not_shrink_what_stands_on_it() {
     let bounds = *world.resource::<SceneBounds>();
     assert!(bounds.radius < 1.5 && bounds.center.length() < 2.0, "{bounds:?}");
     assert_says(&report.decisions().join("\n"), "a few triangles far outside");
+}
+
+#[test]
+fn all_is_seen_in_a_narrow_picture_too() {
+    let folder = Folder::new(&[
+        ("a.obj", format!("{QUAD}f 1 2 3 4\n").as_bytes()),
+        ("narrow.toml", b"[render]\nresolution = [100, 400]\n"),
+    ]);
+    let asked = LoadOptions { resolution: Some([100, 400]), ..LoadOptions::default() };
+    let settings =
+        LoadOptions { scene_settings: Some(folder.0.join("narrow.toml")), ..LoadOptions::default() };
+    for options in [asked, settings] {
+        let (world, report) = folder.load_with("a.obj", &options);
+        report.unwrap();
+        for corner in [[0., 0.], [1., 0.], [1., 1.], [0., 1.]] {
+            assert!(sees_within(&world, DVec3::new(corner[0], corner[1], 0.0), 0.25), "{options:?}");
+        }
+    }
 }
