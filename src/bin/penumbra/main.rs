@@ -59,7 +59,8 @@ fn manual(folder: Option<&Path>) -> u8 {
         // Whoever closed standard output does not want to read it.
         return u8::from(clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout()).is_err());
     };
-    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
+    let written =
+        std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
     match written {
         Ok(()) => 0,
         Err(error) => exit::because(&format!("{}: {error}", folder.display()), exit::FAILED),
