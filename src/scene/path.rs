@@ -2,20 +2,44 @@
 
 use super::Camera;
 use bevy_ecs::prelude::*;
+use std::collections::{HashMap, HashSet};
 
-/// The names from the root down to `entity`; of siblings with one name the second is `name#2`, and so on.
+/// Paths of many entities: siblings are looked at once.
+pub struct Paths<'w> {
+    world: &'w World,
+    /// Of whom the labels of all children, or of all that have no parent, are known.
+    labelled: HashSet<Option<Entity>>,
+    labels: HashMap<Entity, String>,
+}
+
+impl<'w> Paths<'w> {
+    /// Of entities of this world.
+    #[must_use]
+    pub fn new(world: &'w World) -> Self {
+        Self { world, labelled: HashSet::new(), labels: HashMap::new() }
+    }
+
+    /// The names from the root down to `entity`; of siblings with one name the second is `name#2`, and so on.
+    pub fn of(&mut self, entity: Entity) -> Vec<String> {
+        let mut path = Vec::new();
+        let mut here = Some(entity);
+        while let Some(entity) = here {
+            let parent = self.world.get::<ChildOf>(entity).map(ChildOf::parent);
+            if self.labelled.insert(parent) {
+                self.labels.extend(labels(self.world, parent));
+            }
+            path.extend(self.labels.get(&entity).cloned());
+            here = parent;
+        }
+        path.reverse();
+        path
+    }
+}
+
+/// The path of one entity: see [`Paths::of`].
 #[must_use]
 pub fn path_of(world: &World, entity: Entity) -> Vec<String> {
-    let mut path = Vec::new();
-    let mut here = Some(entity);
-    while let Some(entity) = here {
-        let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
-        let label = labels(world, parent).into_iter().find(|(other, _)| *other == entity);
-        path.extend(label.map(|(_, label)| label));
-        here = parent;
-    }
-    path.reverse();
-    path
+    Paths::new(world).of(entity)
 }
 
 /// The entity at the end of `path`, if there is one.
@@ -41,16 +65,14 @@ fn labels(world: &World, parent: Option<Entity>) -> Vec<(Entity, String)> {
             .collect(),
     };
     siblings.sort_by_key(|entity| entity.index_u32());
-    let mut seen: Vec<&str> = Vec::new();
-    let mut labelled = Vec::new();
-    for entity in siblings {
+    let mut seen: HashMap<&str, usize> = HashMap::new();
+    let label = |entity| {
         let name = world.get::<Name>(entity).map_or("", Name::as_str);
-        seen.push(name);
-        let number = seen.iter().filter(|other| **other == name).count();
-        let label = if number == 1 { name.to_owned() } else { format!("{name}#{number}") };
-        labelled.push((entity, label));
-    }
-    labelled
+        let number = seen.entry(name).or_default();
+        *number += 1;
+        (entity, if *number == 1 { name.to_owned() } else { format!("{name}#{number}") })
+    };
+    siblings.into_iter().map(label).collect()
 }
 
 #[cfg(test)]
@@ -82,8 +104,10 @@ mod tests {
             spawn(None, Some(room)),
             spawn(Some("a/b"), Some(other)),
         ];
+        let mut paths = Paths::new(&world);
         for entity in all {
             let path = path_of(&world, entity);
+            assert_eq!(paths.of(entity), path);
             assert_eq!(find(&world, &path), Some(entity), "{path:?}");
         }
         assert_eq!(path_of(&world, all[3]), ["room", "chair#2"]);
