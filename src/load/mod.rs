@@ -13,6 +13,7 @@ mod budget;
 mod builtin;
 mod card;
 mod error;
+mod files;
 mod framing;
 mod geometry;
 mod gltf;
@@ -30,6 +31,7 @@ pub use builtin::{BuiltIn, built_in_scenes};
 pub use card::{Card, Verdict};
 pub(crate) use error::choices;
 pub use error::{LoadError, ReadError};
+pub use files::{SceneFiles, Stamp, stamp};
 pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use made::Made;
 pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
@@ -124,6 +126,8 @@ pub struct LoadOptions {
     pub animation: Option<String>,
     /// Width and height of the picture that a camera of our own is to fit, instead of those of the settings file.
     pub resolution: Option<[u32; 2]>,
+    /// Where the files are noted that the scene is made of, also if it cannot be loaded.
+    pub files: SceneFiles,
 }
 
 /// Reads a scene into the world and derives its `GlobalTransform`s.
@@ -175,7 +179,7 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         settings.spawn_lights(sink)?;
     }
     if let Some(path) = &options.sky {
-        let light = Light::Sky { sky: sky::read(path, &sink.budget)?, scale: Vec3::ONE };
+        let light = Light::Sky { sky: sky::read(path, sink)?, scale: Vec3::ONE };
         sink.spawn((Name::new("sky"), Transform::default(), light));
         sink.decide(&file, format!("its sky is {}", path.display()));
     }
@@ -264,8 +268,9 @@ fn open(source: &SceneSource, sink: &Sink<'_>) -> Result<(String, Folder, Bytes)
             let file = path.to_string_lossy().into_owned();
             let length = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
             sink.budget.take(length, &file, "the file itself")?;
-            match source::read_file(path, SCENE_LIMIT) {
-                Ok(bytes) => Ok((file, Folder::of(path), bytes)),
+            let files = &sink.options.files;
+            match source::read_file(path, SCENE_LIMIT, files) {
+                Ok(bytes) => Ok((file, Folder::of(path, files), bytes)),
                 Err(source) => Err(LoadError::Read { file, source }),
             }
         }
@@ -292,13 +297,14 @@ fn sidecar(
         }
         (None, _) => return Ok(None),
     };
+    options.files.note(&path);
     if !asked_for && !path.is_file() {
         return Ok(None);
     }
     let file = path.to_string_lossy().into_owned();
-    let bytes = source::read_file(&path, TEXT_LIMIT)
+    let bytes = source::read_file(&path, TEXT_LIMIT, &options.files)
         .map_err(|source| LoadError::Read { file: file.clone(), source })?;
-    let settings = Settings::parse(&file, Folder::of(&path), &bytes)?;
+    let settings = Settings::parse(&file, Folder::of(&path, &options.files), &bytes)?;
     if settings.has_models() && !asked_for {
         sink.decide(&file, "has [[model]] and so is a scene of its own, not the settings of this one");
         return Ok(None);

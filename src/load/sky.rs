@@ -1,7 +1,7 @@
 //! Pictures of the sky: `.hdr`, `.exr` and whatever else is decoded.
 
-use super::budget::Budget;
 use super::error::{LoadError, ReadError};
+use super::report::Sink;
 use super::source::{self, SCENE_LIMIT};
 use crate::scene::Sky;
 use crate::scene::color::linear_from_srgb;
@@ -14,9 +14,9 @@ use std::path::Path;
 const MOST_PIXELS: u64 = 1 << 26;
 
 /// Reads a picture of all directions, linear where its format is.
-pub(super) fn read(path: &Path, budget: &Budget) -> Result<Sky, LoadError> {
+pub(super) fn read(path: &Path, sink: &Sink<'_>) -> Result<Sky, LoadError> {
     let file = path.to_string_lossy().into_owned();
-    let bytes = source::read_file(path, SCENE_LIMIT)
+    let bytes = source::read_file(path, SCENE_LIMIT, &sink.options.files)
         .map_err(|source: ReadError| LoadError::Read { file: file.clone(), source })?;
     let broken = |why: &str| LoadError::broken(&file, "the picture of the sky", why);
     let reader = || ImageReader::new(Cursor::new(&*bytes)).with_guessed_format();
@@ -27,7 +27,7 @@ pub(super) fn read(path: &Path, budget: &Budget) -> Result<Sky, LoadError> {
         return Err(broken("has no pixels, or too many"));
     }
     // Decoded, converted, and the table of chances.
-    budget.take(count * 40, &file, "the picture of the sky")?;
+    sink.budget.take(count * 40, &file, "the picture of the sky")?;
     let decoder = reader().ok().and_then(|mut reader| {
         let mut limits = Limits::default();
         limits.max_alloc = Some(count * 32 + (1 << 24));

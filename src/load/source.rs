@@ -2,6 +2,7 @@
 
 use super::builtin;
 use super::error::ReadError;
+use super::files::SceneFiles;
 use std::borrow::Cow;
 use std::fs;
 use std::io::Read;
@@ -20,26 +21,39 @@ pub(super) type Bytes = Cow<'static, [u8]>;
 /// Where the files that a scene file names are looked for.
 #[derive(Clone, Debug)]
 pub(super) enum Folder {
-    /// On disk.
-    Disk(PathBuf),
+    /// On disk; what is asked for is remembered.
+    Disk(PathBuf, SceneFiles),
     /// Among the assets compiled into the program.
     BuiltIn,
 }
 
 impl Folder {
     /// The folder that `path` lies in.
-    pub(super) fn of(path: &Path) -> Self {
-        match path.parent() {
-            Some(parent) if parent != Path::new("") => Self::Disk(parent.to_path_buf()),
-            _ => Self::Disk(PathBuf::from(".")),
-        }
+    pub(super) fn of(path: &Path, files: &SceneFiles) -> Self {
+        let parent = path.parent().filter(|parent| *parent != Path::new(""));
+        Self::Disk(parent.unwrap_or(Path::new(".")).to_path_buf(), files.clone())
     }
 
     /// Where a file that one's own settings name is; `None` in a built-in scene.
     pub(super) fn path(&self, reference: &str) -> Option<PathBuf> {
         match self {
-            Self::Disk(folder) => Some(folder.join(reference)),
+            Self::Disk(folder, _) => Some(folder.join(reference)),
             Self::BuiltIn => None,
+        }
+    }
+
+    /// Reads what one's own settings name, wherever it is; also as messages call it, and the folder that it lies in.
+    pub(super) fn read_own(&self, reference: &str, limit: u64) -> (String, Self, Result<Bytes, ReadError>) {
+        match self {
+            Self::Disk(folder, files) => {
+                let path = folder.join(reference);
+                let bytes = read_file(&path, limit, files);
+                (path.to_string_lossy().into_owned(), Self::of(&path, files), bytes)
+            }
+            Self::BuiltIn => {
+                let asset = builtin::asset(reference).map(Cow::Borrowed);
+                (reference.to_owned(), Self::BuiltIn, asset.ok_or(ReadError::Missing))
+            }
         }
     }
 
@@ -52,12 +66,13 @@ impl Folder {
         let reference = reference.replace('\\', "/");
         let relative = inside(&reference).ok_or(ReadError::Outside)?;
         match self {
-            Self::Disk(folder) => {
+            Self::Disk(folder, files) => {
                 let exact = folder.join(&relative);
+                files.note(&exact);
                 if exact.exists() {
-                    read_file(&exact, limit)
+                    read_file(&exact, limit, files)
                 } else {
-                    read_file(&any_case(folder, &relative)?, limit)
+                    read_file(&any_case(folder, &relative)?, limit, files)
                 }
             }
             Self::BuiltIn => {
@@ -70,7 +85,10 @@ impl Folder {
     pub(super) fn has(&self, reference: &str) -> bool {
         let relative = inside(&reference.replace('\\', "/"));
         relative.is_some_and(|relative| match self {
-            Self::Disk(folder) => any_case(folder, &relative).is_ok_and(|path| path.is_file()),
+            Self::Disk(folder, files) => {
+                files.note(&folder.join(&relative));
+                any_case(folder, &relative).is_ok_and(|path| path.is_file())
+            }
             Self::BuiltIn => builtin::asset(&relative.to_string_lossy()).is_some(),
         })
     }
@@ -90,7 +108,8 @@ impl Folder {
 }
 
 /// Reads a whole regular file of at most `limit` bytes.
-pub(super) fn read_file(path: &Path, limit: u64) -> Result<Bytes, ReadError> {
+pub(super) fn read_file(path: &Path, limit: u64, files: &SceneFiles) -> Result<Bytes, ReadError> {
+    files.note(path);
     let metadata = fs::metadata(path).map_err(from_io)?;
     if !metadata.is_file() {
         return Err(ReadError::NotAFile);

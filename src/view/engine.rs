@@ -16,7 +16,7 @@ use crate::app::{App, FrameBudget, FrameStats};
 use crate::image::compare::LinearImage;
 use crate::image::develop::develop_image;
 use crate::image::{Display, Picture};
-use crate::load::{SceneSource, Watcher};
+use crate::load::Watcher;
 use crate::open::SceneOrigin;
 use crate::preview::Preview;
 use crate::shown::Shown;
@@ -177,11 +177,12 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             if files.is_time() {
                 wanted = wanted.or(Some(None));
             }
-            if let Some(path) = wanted
-                && let Some(other) = self.replaced(&mut app, path)
-            {
-                app = other;
-                prepare(&mut app, &self.interrupt);
+            if let Some(path) = wanted {
+                if let Some(other) = self.replaced(&mut app, path) {
+                    app = other;
+                    prepare(&mut app, &self.interrupt);
+                }
+                // Also if it could not be: what was missing may come.
                 files = self.watch(&app);
             }
             let app = &mut app;
@@ -264,18 +265,19 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
 
     fn watch(&self, app: &App) -> Files {
         let origin = app.world.get_resource::<SceneOrigin>();
-        let watch = origin.and_then(|origin| match &origin.source {
-            SceneSource::BuiltIn(_) | SceneSource::Made(_) => None,
-            SceneSource::File(path) => {
-                let (own, interrupt) = (self.own.clone(), Arc::clone(&self.interrupt));
-                Some(SceneWatch::new(path, move || {
-                    // An engine that has ended does not care.
-                    let _ = own.send(Command::FilesChanged);
-                    interrupt.store(true, Ordering::SeqCst);
-                }))
-            }
+        let files = origin.map(|origin| origin.options.files.list()).filter(|files| !files.is_empty());
+        let watch = files.map(|files| {
+            let (own, interrupt) = (self.own.clone(), Arc::clone(&self.interrupt));
+            SceneWatch::new(files, move || {
+                // An engine that has ended does not care.
+                let _ = own.send(Command::FilesChanged);
+                interrupt.store(true, Ordering::SeqCst);
+            })
         });
-        Files { watch, due: None }
+        let mut files = Files { watch, due: None };
+        // They may have changed since they were read.
+        files.look();
+        files
     }
 
     /// Hands over what is new.

@@ -13,7 +13,7 @@ use super::playing::Clock;
 use crate::app::{App, FrameBudget};
 use crate::image::Display;
 use crate::load::settings::edit::change;
-use crate::load::{LoadOptions, SceneSource, Watcher};
+use crate::load::{LoadOptions, SceneFiles, SceneSource, Watcher};
 use crate::open::{SceneOrigin, Wishes, open};
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Playing, Transform};
 use crate::shown::Shown;
@@ -56,6 +56,8 @@ pub fn set_sky(app: &mut App, sky: PathBuf, watcher: Watcher) -> Result<App, Str
     let mut origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
     let before = origin.clone();
     origin.options.sky = Some(sky);
+    // Those of a sky that cannot be shown are none of the scene's.
+    origin.options.files = SceneFiles::default();
     app.world.insert_resource(origin);
     let loaded = load_again(app, watcher);
     if loaded.is_err() {
@@ -67,14 +69,26 @@ pub fn set_sky(app: &mut App, sky: PathBuf, watcher: Watcher) -> Result<App, Str
 /// Loads the scene again and gives it the camera, the edits and all settings of `app`.
 ///
 /// # Errors
-/// Why it cannot be shown; `app` is as it was then.
+/// Why it cannot be shown; `app` is as it was then, but knows which files were looked for.
 pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     let origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
     let settings = *app.world.resource::<RenderSettings>();
     let wishes = Wishes { size: Some(settings.size), exposure: Some(0.0), ..Wishes::default() };
     let time = app.world.get_resource::<Playing>().and_then(|playing| playing.time);
-    let options = LoadOptions { watcher, time: time.or(origin.options.time), ..origin.options.clone() };
-    let mut again = open(&origin.source, &options, &wishes).map_err(|error| error.to_string())?.app;
+    let files = SceneFiles::default();
+    let options = LoadOptions {
+        watcher,
+        time: time.or(origin.options.time),
+        files: files.clone(),
+        ..origin.options.clone()
+    };
+    let mut again = match open(&origin.source, &options, &wishes) {
+        Ok(opened) => opened.app,
+        Err(error) => {
+            origin.options.files.extend(&files);
+            return Err(error.to_string());
+        }
+    };
     again.world.insert_resource(settings);
     again.world.insert_resource(Film::new(settings.size, app.world.resource::<Film>().first_sample()));
     keep::<Display>(app, &mut again);

@@ -5,6 +5,7 @@
 mod animation;
 mod builder;
 mod compressed;
+mod files;
 mod framing;
 mod gltf;
 mod layers;

@@ -118,7 +118,7 @@ pub(super) fn spawn(
         let Some(path) = settings.folder.path(image) else {
             return Err(settings.broken(table, &name, "image: there is no file in a built-in scene"));
         };
-        light = Light::Sky { sky: sky::read(&path, &sink.budget)?, scale: *radiance };
+        light = Light::Sky { sky: sky::read(&path, sink)?, scale: *radiance };
     }
     let entity = sink.spawn((Name::new(name), transform, light));
     if let Some(visible) = visible {

@@ -1,9 +1,8 @@
 //! The `[[model]]` tables.
 
 use super::{Check, Materials, Settings};
-use crate::load::builtin;
 use crate::load::error::LoadError;
-use crate::load::source::{Bytes, Folder, SCENE_LIMIT, read_file};
+use crate::load::source::{Bytes, Folder, SCENE_LIMIT};
 use crate::scene::Transform;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, DQuat, DVec3, DVec4, EulerRot};
@@ -60,16 +59,7 @@ pub(super) fn resolve(
         ),
     };
     // Whoever writes a scene file may point anywhere, unlike what a downloaded model names.
-    let (file, folder, read) = match &settings.folder {
-        Folder::Disk(folder) => {
-            let path = folder.join(&model.file);
-            (path.to_string_lossy().into_owned(), Folder::of(&path), read_file(&path, SCENE_LIMIT))
-        }
-        Folder::BuiltIn => {
-            let asset = builtin::asset(&model.file).map(Bytes::Borrowed);
-            (model.file.clone(), Folder::BuiltIn, asset.ok_or(crate::load::error::ReadError::Missing))
-        }
-    };
+    let (file, folder, read) = settings.folder.read_own(&model.file, SCENE_LIMIT);
     let bytes = read.map_err(|why| wrong(format!("`{}`: {why}", model.file)))?;
     if Path::new(&model.file).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
         return Err(wrong(format!(

@@ -4,7 +4,7 @@ use super::super::input::Press;
 use super::super::keymap::Hold;
 use super::*;
 use crate::app::FrameSystems;
-use crate::load::LoadOptions;
+use crate::load::{LoadOptions, SceneSource};
 use crate::open::{Wishes, open};
 use bevy_ecs::prelude::{IntoScheduleConfigs, Res};
 use glam::UVec2;
