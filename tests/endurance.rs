@@ -248,9 +248,9 @@ fn equal_to_a_fresh_render(desktop: &Desktop, mut program: Program, said: &std::
     let rendered = desktop.directory.join("fresh.png");
     let mut render = desktop.command(env!("CARGO_BIN_EXE_penumbra"));
     let render = render
-        .arg("render")
-        .args(line.split_whitespace())
-        .args(["--resolution", "320x240", "--spp", "16", "-q", "-o"])
+        // After "penumbra".
+        .args(line.split_whitespace().skip(1))
+        .args(["--spp", "16", "-q", "-o"])
         .arg(&rendered);
     assert!(render.status().unwrap().success(), "{line}");
     let rendered = image::open(rendered).unwrap().to_rgb8();

@@ -1,6 +1,6 @@
 //! Keys that change how the picture is made or shown, and what they answer.
 
-use super::flags::camera_flags;
+use super::flags::{camera_flags, shell_line};
 use super::input::Input;
 use super::keymap::{Hold, Tap};
 use crate::image::develop::exposure_for;
@@ -164,7 +164,7 @@ pub fn print_camera(
     if input.count(Tap::PrintCamera) > 0
         && let Ok((camera, pose, lens)) = cameras.get(active.0)
     {
-        notices.0.push(Notice::Print(camera_flags(*camera, *pose, lens.copied())));
+        notices.0.push(Notice::Print(shell_line(&camera_flags(*camera, *pose, lens.copied()))));
     }
 }
 

@@ -12,7 +12,7 @@ use crate::app::FrameStats;
 use crate::bvh::Ray;
 use crate::load::settings::edit::duplicate;
 use crate::scene::path::path_of;
-use crate::scene::{Hidden, SceneBounds};
+use crate::scene::{Hidden, Playing, SceneBounds};
 use crate::sync::{Entities, Redone};
 use crate::trace::{Geometry, Lights, RenderSettings, Viewpoint};
 use bevy_ecs::prelude::*;
@@ -33,6 +33,8 @@ pub struct Editor {
     edited: Vec<(Entity, usize)>,
     /// Copies, and what they are of.
     copies: Vec<(Entity, Entity)>,
+    /// All of them as text, for who asks in each frame.
+    written: Arc<str>,
     shown: Option<Arc<EditStatus>>,
     before: Redone,
     /// Seconds of bringing the arrays up to date, in the frame of the last edit.
@@ -72,10 +74,16 @@ impl Editor {
         self.shown.clone()
     }
 
-    /// What was changed, in the order in which it was first.
+    /// Whether anything was edited.
     #[must_use]
-    pub fn edited(&self) -> (&[(Entity, usize)], &[(Entity, Entity)]) {
-        (&self.edited, &self.copies)
+    pub fn has_edits(&self) -> bool {
+        !self.edited.is_empty()
+    }
+
+    /// The `[[edit]]` tables of all that was edited until the last frame; empty if nothing was.
+    #[must_use]
+    pub fn written(&self) -> &str {
+        &self.written
     }
 
     fn note(&mut self, selection: Selection) {
@@ -191,16 +199,7 @@ fn copy(world: &mut World, editor: &mut Editor) {
     crate::app::propagate(world);
     editor.copies.push((copy, selection.entity));
     let copied = Selection { entity: copy, slot: selection.slot };
-    // To undo it is to hide it: what it was then is not there.
-    editor.undo.push(Undo {
-        selection: copied,
-        property: None,
-        transform: None,
-        pose: None,
-        light: None,
-        material: None,
-        hidden: true,
-    });
+    editor.undo.push(Undo::of_copy(copied));
     editor.selected = Some(copied);
     // Beside the original, not in it.
     let aside = rows(world, copy, 0, radius(world)).first().map(|row| row.stepped(5.0));
@@ -221,10 +220,23 @@ pub fn start_sync(mut editor: ResMut<Editor>, redone: Res<Redone>, stats: Res<Fr
 
 /// After it: what was it that had to be done?
 pub fn finish_sync(world: &mut World) {
-    if !world.resource::<Editor>().dirty {
+    let editor = world.resource::<Editor>();
+    // What was edited may be animated too.
+    let moved = editor.has_edits() && world.is_resource_changed::<Playing>();
+    let dirty = editor.dirty;
+    if !(dirty || moved) {
         return;
     }
     let Some(mut editor) = world.remove_resource::<Editor>() else { return };
+    editor.written = save::edits(world, &editor).unwrap_or_default().into();
+    if dirty {
+        show(world, &mut editor);
+    }
+    world.insert_resource(editor);
+}
+
+/// What the card shows now.
+fn show(world: &World, editor: &mut Editor) {
     editor.dirty = false;
     editor.sync = editor.sync_began.take().map_or(Duration::ZERO, |began| began.elapsed());
     let now = *world.resource::<Redone>();
@@ -242,7 +254,6 @@ pub fn finish_sync(world: &mut World) {
             redone: editor.redone.clone(),
         })
     });
-    world.insert_resource(editor);
 }
 
 fn told(before: Redone, now: Redone, time: Duration, lost: f64) -> String {

@@ -1,14 +1,13 @@
 //! What was edited, as a settings file that `render` reads.
 
 use super::super::controls::Notice;
-use super::super::flags::{camera_flags, part_flags};
+use super::super::flags::{look_flags, shell_line};
 use super::Editor;
-use crate::image::Display;
 use crate::load::SceneSource;
 use crate::load::settings::edit::{EditTable, LightEdit, MaterialEdit, rows_of};
 use crate::open::SceneOrigin;
-use crate::scene::path::path_of;
-use crate::scene::{ActiveCamera, Camera, GlobalTransform, Hidden, Lens, Light, Material, Transform};
+use crate::scene::path::Paths;
+use crate::scene::{Hidden, Light, Material, Transform};
 use crate::sync::RenderOrigin;
 use bevy_ecs::prelude::*;
 use serde::Serialize;
@@ -24,19 +23,19 @@ struct Tables {
 /// The `[[edit]]` tables of all that was edited; copies first, for others may be copies of them.
 #[must_use]
 pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
-    let (edited, copies) = editor.edited();
+    let mut paths = Paths::new(world);
     let origin = world.resource::<RenderOrigin>().0.map(|origin| origin.to_array());
     let mut tables = vec![EditTable { origin, ..EditTable::default() }];
-    tables.extend(copies.iter().map(|&(copy, original)| EditTable {
-        entity: path_of(world, copy),
-        copy_of: Some(path_of(world, original)),
+    tables.extend(editor.copies.iter().map(|&(copy, original)| EditTable {
+        entity: paths.of(copy),
+        copy_of: Some(paths.of(original)),
         ..EditTable::default()
     }));
-    for &(entity, slot) in edited {
+    for &(entity, slot) in &editor.edited {
         let material = super::property::material_of(world, entity, slot);
         let material = material.and_then(|m| world.get::<Material>(m)).map(MaterialEdit::of);
         tables.push(EditTable {
-            entity: path_of(world, entity),
+            entity: paths.of(entity),
             origin: None,
             copy_of: None,
             matrix: world.get::<Transform>(entity).map(rows_of),
@@ -68,18 +67,24 @@ pub fn text(world: &World, editor: &Editor) -> Result<(String, PathBuf), String>
         // Its textures are named from where it is.
         folder = own.parent().map_or(folder, PathBuf::from);
     }
-    Ok((text + &edits(world, editor)?, folder))
+    // Those that the program was started with have not been saved either.
+    let before = origin.options.edits.as_deref().unwrap_or_default();
+    text = format!("{text}{before}\n{}", edits(world, editor)?);
+    Ok((text, folder))
 }
 
-/// The edits alone.
+/// The edits alone; empty if there are none.
 ///
 /// # Errors
 /// What cannot be written down.
 pub fn edits(world: &World, editor: &Editor) -> Result<String, String> {
+    if !editor.has_edits() {
+        return Ok(String::new());
+    }
     toml::to_string(&Tables { edit: tables(world, editor) }).map_err(|error| error.to_string())
 }
 
-/// Writes the first of `{scene}.edits_1.toml`, `_2` … that is not there, and says how to render it.
+/// Writes the first of `{scene}.edits_1.toml`, `_2` … that is not there, and gives the command that renders it as it is seen.
 #[must_use]
 pub fn save(world: &World, editor: &Editor) -> Notice {
     match write(world, editor) {
@@ -89,45 +94,26 @@ pub fn save(world: &World, editor: &Editor) -> Notice {
 }
 
 fn write(world: &World, editor: &Editor) -> Result<String, String> {
-    if editor.edited().0.is_empty() {
+    let origin = world.get_resource::<SceneOrigin>().ok_or("the scene is of no file")?;
+    if !editor.has_edits() && origin.options.edits.is_none() {
         return Err("nothing was edited".to_owned());
     }
     let (text, folder) = text(world, editor)?;
-    let origin = world.get_resource::<SceneOrigin>().ok_or("the scene is of no file")?;
     let stem = origin.source.name();
     for n in 1..u32::MAX {
         let path = folder.join(format!("{stem}.edits_{n}.toml"));
         match File::create_new(&path) {
             Ok(mut file) => {
                 file.write_all(text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
-                let scene = match &origin.source {
-                    SceneSource::File(scene) => scene.display().to_string(),
-                    SceneSource::BuiltIn(name) => (*name).to_owned(),
-                    SceneSource::Made(made) => made.name.to_owned(),
-                };
-                let path = path.strip_prefix(".").unwrap_or(&path);
-                return Ok(format!("{scene} --scene-settings {} {}", path.display(), look(world)));
+                let path = path.strip_prefix(".").unwrap_or(&path).display().to_string();
+                let mut command = ["penumbra", "render"].map(str::to_owned).to_vec();
+                command.extend([origin.source.to_string(), "--scene-settings".to_owned(), path]);
+                command.extend(look_flags(world));
+                return Ok(shell_line(&command));
             }
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
             Err(error) => return Err(format!("{}: {error}", path.display())),
         }
     }
     Err("no number is left".to_owned())
-}
-
-/// The flags of what the edits may not speak of: part of the file, time, camera and exposure.
-fn look(world: &World) -> String {
-    let display = world.resource::<Display>();
-    let mut flags = format!("--exposure {}", display.exposure);
-    for (flag, value) in part_flags(world) {
-        // As a shell takes it, whatever the file calls its things.
-        let is_plain = value.chars().all(|c| c.is_ascii_alphanumeric() || "._-".contains(c));
-        let quoted = if is_plain { value } else { format!("'{}'", value.replace('\'', r"'\''")) };
-        flags += &format!(" {flag} {quoted}");
-    }
-    let active = world.resource::<ActiveCamera>().0;
-    if let (Some(camera), Some(pose)) = (world.get::<Camera>(active), world.get::<GlobalTransform>(active)) {
-        flags += &format!(" {}", camera_flags(*camera, *pose, world.get::<Lens>(active).copied()));
-    }
-    flags
 }

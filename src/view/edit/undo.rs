@@ -19,6 +19,21 @@ pub(super) struct Undo {
     pub(super) hidden: bool,
 }
 
+impl Undo {
+    /// To undo a copy is to hide it: what it was then is not there.
+    pub(super) fn of_copy(selection: Selection) -> Self {
+        Self {
+            selection,
+            property: None,
+            transform: None,
+            pose: None,
+            light: None,
+            material: None,
+            hidden: true,
+        }
+    }
+}
+
 /// Remembers how it is now.
 pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection, property: Option<Property>) {
     let last = editor.undo.last();
