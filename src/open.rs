@@ -132,7 +132,8 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let exposure = wishes.exposure.or(file.exposure);
     // Loaded again in a window of another shape, a camera of our own stands where it stood.
     options.resolution = Some(settings.size.to_array());
-    app.world.insert_resource(SceneOrigin { source: source.clone(), options });
+    let (camera, pose) = (wishes.camera.clone(), wishes.pose);
+    app.world.insert_resource(SceneOrigin { source: source.clone(), options, camera, pose });
     if let Some(origin) = report.render.origin {
         app.world.insert_resource(RenderOrigin(Some(origin.into())));
     }
@@ -167,6 +168,10 @@ pub struct SceneOrigin {
     pub source: SceneSource,
     /// How it was loaded.
     pub options: LoadOptions,
+    /// Which of its cameras was asked for: see [`Wishes::camera`].
+    pub camera: Option<String>,
+    /// And how that was changed.
+    pub pose: Pose,
 }
 
 fn choose_camera(

@@ -20,6 +20,25 @@ pub struct FileCameras {
     pub last: Entity,
 }
 
+/// The file's cameras, in its order.
+fn file_cameras(world: &World) -> Vec<Entity> {
+    let is_of_file =
+        |e: &EntityRef<'_>| e.contains::<Camera>() && e.contains::<Name>() && !e.contains::<FlyCamera>();
+    let mut cameras: Vec<Entity> = world.iter_entities().filter(is_of_file).map(|e| e.id()).collect();
+    cameras.sort_by_key(|camera| camera.index_u32());
+    cameras
+}
+
+/// The camera of `to`, the same scene loaded again, that `camera` is in `from`: by name, and of several by their order.
+#[must_use]
+pub fn same_camera(from: &World, camera: Entity, to: &World) -> Option<Entity> {
+    let name = from.get::<Name>(camera)?;
+    let named =
+        |world| file_cameras(world).into_iter().filter(move |&other| world.get::<Name>(other) == Some(name));
+    let index = named(from).position(|other| other == camera)?;
+    named(to).nth(index)
+}
+
 /// Places that the user remembers.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Bookmarks([Option<Bookmark>; 9]);

@@ -1,6 +1,6 @@
 //! Another scene in the running window, or the same one again from its files.
 
-use super::cameras::Bookmarks;
+use super::cameras::{Bookmarks, FileCameras, same_camera};
 use super::controls::Paused;
 use super::edit::Editor;
 use super::edit::save::tables;
@@ -14,10 +14,10 @@ use crate::app::{App, FrameBudget};
 use crate::image::Display;
 use crate::load::settings::edit::change;
 use crate::load::{LoadOptions, SceneFiles, SceneSource, Watcher};
-use crate::open::{SceneOrigin, Wishes, open};
+use crate::open::{OpenError, SceneOrigin, Wishes, open};
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Playing, Transform};
 use crate::shown::Shown;
-use crate::sync::BlasCache;
+use crate::sync::{BlasCache, Instructions};
 use crate::trace::{Film, RenderSettings};
 use bevy_ecs::prelude::*;
 use std::path::{Path, PathBuf};
@@ -29,8 +29,12 @@ use std::path::{Path, PathBuf};
 pub fn open_other(app: &App, path: &Path, watcher: Watcher) -> Result<App, String> {
     let source = SceneSource::File(path.to_path_buf());
     let settings = app.world.resource::<RenderSettings>();
-    let wishes =
-        Wishes { size: Some(settings.size), integrator: Some(settings.integrator), ..Wishes::default() };
+    let wishes = Wishes {
+        size: Some(settings.size),
+        integrator: Some(settings.integrator),
+        isa: Some(app.world.resource::<Instructions>().0),
+        ..Wishes::default()
+    };
     let mut other = open(&source, &LoadOptions { watcher, ..LoadOptions::default() }, &wishes)
         .map_err(|error| error.to_string())?
         .app;
@@ -73,7 +77,14 @@ pub fn set_sky(app: &mut App, sky: PathBuf, watcher: Watcher) -> Result<App, Str
 pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     let origin = app.world.get_resource::<SceneOrigin>().cloned().ok_or("the scene is of no file")?;
     let settings = *app.world.resource::<RenderSettings>();
-    let wishes = Wishes { size: Some(settings.size), exposure: Some(0.0), ..Wishes::default() };
+    let mut wishes = Wishes {
+        size: Some(settings.size),
+        exposure: Some(0.0),
+        isa: Some(app.world.resource::<Instructions>().0),
+        camera: origin.camera.clone(),
+        pose: origin.pose,
+        ..Wishes::default()
+    };
     let time = app.world.get_resource::<Playing>().and_then(|playing| playing.time);
     let files = SceneFiles::default();
     let options = LoadOptions {
@@ -82,13 +93,20 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
         files: files.clone(),
         ..origin.options.clone()
     };
-    let mut again = match open(&origin.source, &options, &wishes) {
+    let mut opened = open(&origin.source, &options, &wishes);
+    if let Err(OpenError::Camera { .. }) = opened {
+        // The camera that was asked for at first may be gone.
+        wishes.camera = None;
+        opened = open(&origin.source, &options, &wishes);
+    }
+    let mut again = match opened {
         Ok(opened) => opened.app,
         Err(error) => {
             origin.options.files.extend(&files);
             return Err(error.to_string());
         }
     };
+    again.world.resource_mut::<SceneOrigin>().camera = origin.camera;
     again.world.insert_resource(settings);
     again.world.insert_resource(Film::new(settings.size, app.world.resource::<Film>().first_sample()));
     keep::<Display>(app, &mut again);
@@ -132,20 +150,26 @@ fn keep<T: Resource + Clone>(from: &App, to: &mut App) {
     }
 }
 
-/// A camera that the user has flown stays where it is; one of the file's is that of the file.
+/// The camera that is looked through stays: one that the user has flown where it is, one of the file as that has it now.
 fn keep_camera(from: &App, to: &mut App) {
+    let home = to.world.resource::<ActiveCamera>().0;
+    let same = |camera| same_camera(&from.world, camera, &to.world).unwrap_or(home);
     let active = from.world.resource::<ActiveCamera>().0;
-    if let (Some(fly), Some(state), Some(camera), Some(pose)) = (
-        from.world.get::<FlyCamera>(active),
-        from.world.get::<FlyCameraState>(active),
-        from.world.get::<Camera>(active),
-        from.world.get::<GlobalTransform>(active),
-    ) {
-        let mut entity = to.world.spawn((*fly, *state, *camera, *pose, Transform(pose.0)));
-        if let Some(lens) = from.world.get::<Lens>(active) {
-            entity.insert(*lens);
-        }
-        let entity = entity.id();
-        to.world.insert_resource(ActiveCamera(entity));
+    let last = from.world.get_resource::<FileCameras>().map_or(home, |seen| same(seen.last));
+    let same = same(active);
+    let active = flown(&from.world, active, &mut to.world).unwrap_or(same);
+    to.world.insert_resource(FileCameras { home, last });
+    to.world.insert_resource(ActiveCamera(active));
+}
+
+/// A camera in `to` like `camera`, if that is one that the user flies.
+fn flown(from: &World, camera: Entity, to: &mut World) -> Option<Entity> {
+    let entity = from.entity(camera);
+    let (&fly, &state) = (entity.get::<FlyCamera>()?, entity.get::<FlyCameraState>()?);
+    let (&camera, &pose) = (entity.get::<Camera>()?, entity.get::<GlobalTransform>()?);
+    let mut copy = to.spawn((fly, state, camera, pose, Transform(pose.0)));
+    if let Some(&lens) = entity.get::<Lens>() {
+        copy.insert(lens);
     }
+    Some(copy.id())
 }
