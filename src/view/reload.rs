@@ -2,8 +2,8 @@
 
 use super::cameras::{Bookmarks, FileCameras, same_camera};
 use super::controls::Paused;
-use super::edit::Editor;
-use super::edit::save::tables;
+use super::debug::Debug;
+use super::edit::carry::carry;
 use super::fly::{FlyCamera, FlyCameraState, FlySpeed};
 use super::input::Input;
 use super::instrument::Instrument;
@@ -12,12 +12,11 @@ use super::pixel_view::PixelView;
 use super::playing::Clock;
 use crate::app::{App, FrameBudget};
 use crate::image::Display;
-use crate::load::settings::edit::change;
 use crate::load::{LoadOptions, SceneFiles, SceneSource, Watcher};
 use crate::open::{OpenError, SceneOrigin, Wishes, open};
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Playing, Transform};
 use crate::shown::Shown;
-use crate::sync::{BlasCache, Instructions};
+use crate::sync::{BlasCache, Instructions, RenderOrigin};
 use crate::trace::{Film, RenderSettings};
 use bevy_ecs::prelude::*;
 use std::path::{Path, PathBuf};
@@ -126,12 +125,11 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
         again.world.insert_resource(clock.restarted());
     }
     keep::<PixelView>(app, &mut again);
-    if let Some(editor) = app.world.get_resource::<Editor>() {
-        for table in tables(&app.world, editor) {
-            // What is not there any more cannot be edited.
-            let _ = change(&mut again.world, &table);
-        }
+    // Pixels are pinned in coordinates that count from there.
+    if app.world.resource::<RenderOrigin>() == again.world.resource::<RenderOrigin>() {
+        keep::<Debug>(app, &mut again);
     }
+    carry(&app.world, &mut again.world);
     keep_camera(app, &mut again);
     Ok(again)
 }
@@ -173,3 +171,6 @@ fn flown(from: &World, camera: Entity, to: &mut World) -> Option<Entity> {
     }
     Some(copy.id())
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,6 @@
 //! Changing the scene while it is seen: pick a thing, change its numbers, take it back, keep it in a file.
 
+pub mod carry;
 pub mod property;
 pub mod save;
 mod undo;
@@ -10,7 +11,7 @@ use super::keymap::Tap;
 use super::orbit::ray_through;
 use crate::app::FrameStats;
 use crate::bvh::Ray;
-use crate::load::settings::edit::duplicate;
+use crate::load::settings::edit::{EditTable, duplicate};
 use crate::scene::path::path_of;
 use crate::scene::{Hidden, Playing, SceneBounds};
 use crate::sync::{Entities, Redone};
@@ -33,6 +34,8 @@ pub struct Editor {
     edited: Vec<(Entity, usize)>,
     /// Copies, and what they are of.
     copies: Vec<(Entity, Entity)>,
+    /// Edits of what the scene had before it was loaded again, should it come back.
+    waiting: Vec<EditTable>,
     /// All of them as text, for who asks in each frame.
     written: Arc<str>,
     shown: Option<Arc<EditStatus>>,
@@ -77,7 +80,7 @@ impl Editor {
     /// Whether anything was edited.
     #[must_use]
     pub fn has_edits(&self) -> bool {
-        !self.edited.is_empty()
+        !(self.edited.is_empty() && self.waiting.is_empty())
     }
 
     /// The `[[edit]]` tables of all that was edited until the last frame; empty if nothing was.

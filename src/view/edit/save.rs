@@ -31,6 +31,7 @@ pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
         copy_of: Some(paths.of(original)),
         ..EditTable::default()
     }));
+    tables.extend(editor.waiting.iter().cloned());
     for &(entity, slot) in &editor.edited {
         let material = super::property::material_of(world, entity, slot);
         let material = material.and_then(|m| world.get::<Material>(m)).map(MaterialEdit::of);

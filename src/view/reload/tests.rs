@@ -1,0 +1,236 @@
+//! What stays when the scene is loaded again.
+
+use super::super::controls::{Notice, Notices};
+use super::super::input::Press;
+use super::super::keymap::Tap;
+use super::super::prepare::prepare;
+use super::super::recipe::recipe;
+use super::*;
+use crate::bvh::Isa;
+use crate::cli::{Cli, Command};
+use crate::farm::Identity;
+use crate::image::ToneMap;
+use crate::open::Pose;
+use crate::scene::Filter;
+use crate::trace::Integrator;
+use bevy_ecs::name::Name;
+use clap::Parser;
+use glam::{DVec3, UVec2};
+use std::sync::Arc;
+
+/// A grey floor and a lamp, in a folder that is gone when the test is over.
+struct Stage(PathBuf);
+
+impl Stage {
+    fn new(test: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("penumbra-reload-{test}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let stage = Self(folder);
+        stage.write("floor.obj", "v -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nf 1 4 3 2\n");
+        stage.write("scene.toml", &Self::scene("floor.obj", 9));
+        stage
+    }
+
+    fn scene(model: &str, intensity: u32) -> String {
+        format!(
+            "[[model]]\nfile = '{model}'\n[[light]]\nkind = 'point'\nposition = [0, 3, 1]\n\
+             intensity = [{intensity}, 9, 9]\n[camera]\nposition = [0, 2, 6]\ntarget = [0, 0, 0]\n"
+        )
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.0.join(name), text).unwrap();
+    }
+
+    fn open(&self, name: &str, wishes: Wishes, options: &LoadOptions) -> App {
+        let wishes = Wishes { size: Some(UVec2::new(32, 24)), ..wishes };
+        ready(open(&SceneSource::File(self.0.join(name)), options, &wishes).unwrap().app)
+    }
+
+    fn scene_shown(&self) -> App {
+        self.open("scene.toml", Wishes::default(), &LoadOptions::default())
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn ready(mut app: App) -> App {
+    prepare(&mut app, &Arc::default());
+    app.world.init_resource::<Instrument>();
+    app.frame();
+    app
+}
+
+fn again(app: &mut App) -> App {
+    ready(load_again(app, Watcher::default()).unwrap())
+}
+
+fn press(app: &mut App, taps: &[Tap]) {
+    for &tap in taps {
+        app.world.resource_mut::<Input>().taps.push(Press::from(tap));
+        app.frame();
+        app.world.resource_mut::<Input>().end_frame();
+    }
+}
+
+fn identity(app: &App) -> Identity {
+    Identity::of(&app.world, String::new())
+}
+
+fn edits(app: &App) -> Option<String> {
+    let arguments = recipe(&app.world).arguments;
+    let at = arguments.iter().position(|argument| argument == "--edits")?;
+    arguments.get(at + 1).cloned()
+}
+
+fn last_notice(app: &App) -> Notice {
+    app.world.resource::<Notices>().0.last().cloned().unwrap()
+}
+
+/// The floor is selected, moved and copied.
+const EDIT: [Tap; 4] = [Tap::Select, Tap::More, Tap::Duplicate, Tap::More];
+
+#[test]
+fn edits_are_known_after_any_number_of_reloads_and_undone_to_what_the_files_say() {
+    let stage = Stage::new("edits");
+    let mut app = stage.scene_shown();
+    press(&mut app, &EDIT);
+    let edited = identity(&app);
+    let text = edits(&app).unwrap();
+    let mut app = again(&mut again(&mut app));
+    assert_eq!(identity(&app), edited);
+    assert_eq!(edits(&app), Some(text.clone()));
+    // The copy is still selected.
+    press(&mut app, &[Tap::More]);
+    assert_ne!(identity(&app), edited);
+    stage.write("scene.toml", &Stage::scene("floor.obj", 5));
+    let fresh = identity(&stage.scene_shown());
+    let mut app = again(&mut app);
+    press(&mut app, &[Tap::SaveEdits]);
+    assert!(matches!(last_notice(&app), Notice::Print(_)), "{:?}", last_notice(&app));
+    press(&mut app, &[Tap::Undo; 4]);
+    assert_eq!(last_notice(&app), Notice::Text("nothing to undo".to_owned()));
+    assert_eq!(identity(&app).differences(&fresh), Vec::<String>::new());
+}
+
+#[test]
+fn edits_of_what_is_gone_wait_until_it_is_back() {
+    let stage = Stage::new("waiting");
+    let mut app = stage.scene_shown();
+    press(&mut app, &EDIT);
+    let (edited, text) = (identity(&app), edits(&app));
+    stage.write("other.obj", "v -3 0 -3\nv 3 0 -3\nv 3 0 3\nf 1 3 2\n");
+    stage.write("scene.toml", &Stage::scene("other.obj", 9));
+    let mut app = again(&mut app);
+    assert_ne!(identity(&app), edited);
+    assert!(edits(&app).unwrap().contains("copy_of = [\"floor\""));
+    let mut app = again(&mut app);
+    stage.write("scene.toml", &Stage::scene("floor.obj", 9));
+    let app = again(&mut app);
+    assert_eq!((identity(&app), edits(&app)), (edited, text));
+}
+
+/// A triangle, and two cameras.
+const CAMERAS: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2]}],
+    "nodes":[{"mesh":0},{"name":"near","camera":0,"translation":[0,0,4]},
+    {"name":"far","camera":0,"translation":[0,0,9]}],"cameras":[{"type":"perspective",
+    "perspective":{"yfov":0.7,"znear":0.1}}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+    "buffers":[{"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA",
+    "byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}]}"#;
+
+#[test]
+fn the_camera_in_use_stays_and_enter_finds_the_first_one() {
+    let stage = Stage::new("cameras");
+    stage.write("a.gltf", CAMERAS);
+    let asked = || Wishes { camera: Some("far".to_owned()), isa: Some(Isa::SCALAR), ..Wishes::default() };
+    let mut app = stage.open("a.gltf", asked(), &LoadOptions::default());
+    let first = identity(&app).camera;
+    let mut app = again(&mut app);
+    assert_eq!(identity(&app).camera, first, "the one that was asked for");
+    assert_eq!(app.world.resource::<Instructions>().0, Isa::SCALAR);
+    press(&mut app, &[Tap::NextCamera]);
+    let near = identity(&app).camera;
+    assert_ne!(near, first);
+    let mut app = again(&mut app);
+    assert_eq!(identity(&app).camera, near, "the one that was chosen");
+    press(&mut app, &[Tap::FrameAll]);
+    let flown = identity(&app).camera;
+    let mut app = again(&mut again(&mut app));
+    assert_eq!(identity(&app).camera, flown);
+    press(&mut app, &[Tap::ResetCamera]);
+    assert_eq!(identity(&app).camera, first, "the window opened with it");
+    press(&mut app, &[Tap::NextCamera]);
+    assert_eq!(identity(&app).camera, near);
+    // It is gone for a while: the file's first one instead.
+    stage.write("a.gltf", &CAMERAS.replace("\"far\"", "\"other\""));
+    let mut app = again(&mut app);
+    assert_eq!(identity(&app).camera, near);
+    press(&mut app, &[Tap::ResetCamera]);
+    assert_eq!(identity(&app).camera, near);
+}
+
+#[test]
+fn a_place_given_by_flags_stays() {
+    let stage = Stage::new("pose");
+    let pose = Pose { position: Some(DVec3::new(1.0, 3.0, 5.0)), ..Pose::default() };
+    let wishes = Wishes { pose, ..Wishes::default() };
+    let mut app = stage.open("scene.toml", wishes, &LoadOptions::default());
+    let camera = identity(&app).camera;
+    let mut app = again(&mut again(&mut app));
+    assert_eq!(identity(&app).camera, camera);
+    press(&mut app, &[Tap::NextCamera]);
+    let app = again(&mut app);
+    let active = app.world.resource::<ActiveCamera>().0;
+    assert_eq!(app.world.get::<Name>(active).map(Name::as_str), Some("camera"));
+}
+
+#[test]
+fn what_was_looked_for_in_vain_is_known_after_a_failure() {
+    let stage = Stage::new("failure");
+    let mut app = stage.scene_shown();
+    stage.write("scene.toml", &Stage::scene("missing.obj", 9));
+    assert!(load_again(&mut app, Watcher::default()).is_err());
+    let files = app.world.resource::<SceneOrigin>().options.files.list();
+    assert_eq!(files.get(&stage.0.join("missing.obj")), Some(&None));
+    assert_eq!(
+        files.get(&stage.0.join("scene.toml")),
+        Some(&crate::load::stamp(&stage.0.join("scene.toml")))
+    );
+    assert!(files.contains_key(&stage.0.join("floor.obj")));
+}
+
+#[test]
+fn the_printed_command_makes_what_is_seen_with_a_dropped_sky_and_all_settings() {
+    let stage = Stage::new("command");
+    let sky = stage.0.join("sky.exr");
+    let bytes: Vec<u8> = (0..8 * 4).flat_map(|_| [1.0_f32, 0.5, 0.2]).flat_map(f32::to_ne_bytes).collect();
+    image::save_buffer(&sky, &bytes, 8, 4, image::ColorType::Rgb32F).unwrap();
+    // What was edited before, and never saved.
+    let mut before = stage.scene_shown();
+    press(&mut before, &EDIT);
+    let options = LoadOptions { edits: edits(&before), ..LoadOptions::default() };
+    let mut app = stage.open("scene.toml", Wishes { seed: Some(7), ..Wishes::default() }, &options);
+    let mut app = ready(set_sky(&mut app, sky, Watcher::default()).unwrap());
+    press(&mut app, &[Tap::Select, Tap::NextRow, Tap::More, Tap::FrameAll, Tap::Brighter]);
+    let mut settings = app.world.resource_mut::<RenderSettings>();
+    settings.max_depth = 3;
+    settings.integrator = Integrator::Path;
+    settings.filter = Some(Filter::Nearest);
+    app.world.resource_mut::<Display>().tone_map = ToneMap::AgX;
+    press(&mut app, &[Tap::SaveEdits]);
+    let Notice::Print(line) = last_notice(&app) else { panic!("{:?}", last_notice(&app)) };
+    let cli = Cli::try_parse_from(line.split_whitespace()).unwrap();
+    let Some(Command::Render(render)) = cli.command else { panic!("{line}") };
+    let output = render.output.clone();
+    let scene = render.scene().unwrap();
+    let source = scene.source().unwrap();
+    let rendered = open(&source, &scene.load_options(), &scene.wishes(&output)).unwrap().app;
+    assert_eq!(identity(&rendered).differences(&identity(&app)), Vec::<String>::new(), "{line}");
+    let shown = |app: &App| *app.world.resource::<Display>();
+    assert_eq!(shown(&rendered), shown(&app));
+}
