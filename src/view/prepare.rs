@@ -8,6 +8,7 @@ use super::controls::{
 };
 use super::crop::change_region;
 use super::debug::{CurrentLayer, Debug, DebugLines, change_debug, draw_layer, explain_pinned};
+use super::edit::marks::{Marks, mark};
 use super::edit::{Editor, edit_scene, finish_sync, start_sync};
 use super::engine::Pending;
 use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
@@ -71,6 +72,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<FirstHits>();
     app.world.init_resource::<Debug>();
     app.world.init_resource::<Editor>();
+    app.world.init_resource::<Marks>();
     app.world.init_resource::<DebugLines>();
     app.world.init_resource::<CurrentLayer>();
     let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
@@ -99,7 +101,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     );
     app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
     app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
-    app.add_systems(finish_sync.in_set(FrameSystems::Sync).after(reset_film));
+    app.add_systems((finish_sync, mark).chain().in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems(count_held.in_set(FrameSystems::Trace));
     app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));

@@ -4,6 +4,7 @@ pub mod boxes;
 pub mod layer;
 
 use super::controls::{Notice, Notices};
+use super::edit::marks::Marks;
 use super::input::{Input, Press};
 use super::keymap::Tap;
 use super::pixel_view::{DepthWanted, FirstHits};
@@ -255,7 +256,7 @@ fn step_lines(tlas: &Tlas, steps: &[Step]) -> Vec<Line> {
 
 /// Draws the lines as the camera sees them now.
 pub fn draw_layer(
-    lines: Res<DebugLines>,
+    (lines, marks): (Res<DebugLines>, Res<Marks>),
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
     first: Res<FirstHits>,
@@ -263,12 +264,13 @@ pub fn draw_layer(
     mut drawn: Local<u64>,
     mut layer: ResMut<CurrentLayer>,
 ) {
-    let is_new = lines.is_changed() || first.is_changed() || *drawn != redone.resets;
-    if !is_new || lines.0.is_empty() && layer.0.is_none() {
+    let is_new = lines.is_changed() || marks.is_changed() || first.is_changed() || *drawn != redone.resets;
+    let is_empty = lines.0.is_empty() && marks.is_empty();
+    if !is_new || is_empty && layer.0.is_none() {
         return;
     }
     *drawn = redone.resets;
-    if lines.0.is_empty() {
+    if is_empty {
         layer.0 = None;
         return;
     }
@@ -276,5 +278,6 @@ pub fn draw_layer(
     let surfaces = first.surfaces.as_ref().filter(|grid| grid.size() == size && grid.is_covered());
     let mut made = Layer::new(size);
     made.draw(&lines.0, &viewpoint, surfaces.map(crate::trace::first::Grid::cells));
+    made.draw(&marks.lines(&viewpoint, size), &viewpoint, None);
     layer.0 = Some(Arc::new(made));
 }

@@ -121,6 +121,10 @@ pub enum Tap {
     Order,
     /// Edit what is under the cursor.
     Select,
+    /// Edit the thing before, in the order of all things.
+    PreviousThing,
+    /// Edit the next thing.
+    NextThing,
     /// The number above.
     PreviousRow,
     /// The number below.
