@@ -81,13 +81,18 @@ pub fn take_off(
     free: Query<Entity, With<FlyCamera>>,
     mut commands: Commands,
 ) {
-    let moves = input.has_motion() || input.taps.iter().any(|press| press.tap.changes_free_camera());
-    if !moves || free.contains(active.0) {
+    if free.contains(active.0) {
         return;
     }
     let Ok((camera, pose, lens)) = cameras.get(active.0) else {
         return;
     };
+    // Focusing changes a lens, and without one nothing that is seen.
+    let focuses = lens.is_some() && input.count(Tap::Focus) > 0;
+    let changes = input.taps.iter().any(|press| press.tap.changes_free_camera());
+    if !(input.has_motion() || changes || focuses) {
+        return;
+    }
     let state = FlyCameraState::of(pose.0.matrix3);
     let bundle = (*camera, Transform(pose.0), *pose, state);
     let entity = match free.iter().next() {

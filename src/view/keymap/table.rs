@@ -68,7 +68,10 @@ pub const TABLE: &[Section] = &[
     (
         "Views",
         &[
-            row("pivot and sharpness to the point under the cursor", &[tap("focus", Tap::Focus, &["F"])]),
+            row(
+                "pivot and sharpness to the point under the cursor (with a lens *)",
+                &[tap("focus", Tap::Focus, &["F"])],
+            ),
             row("whole scene *", &[tap("frame_all", Tap::FrameAll, &["Home"])]),
             row("first camera *", &[tap("reset_camera", Tap::ResetCamera, &["Enter", "NumpadEnter"])]),
             row(
