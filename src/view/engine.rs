@@ -21,6 +21,7 @@ use crate::open::SceneOrigin;
 use crate::preview::Preview;
 use crate::shown::Shown;
 use crate::sync::Redone;
+use crate::trace::Viewpoint;
 use bevy_ecs::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -119,7 +120,9 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                     let rgba = develop_image(image, app.world.resource::<Display>());
                     (self.wake)(Wake::Reference(Picture { size: image.size, rgba, version: 0 }));
                 }
-                app.world.insert_resource(Instrument::against(reference.map(Reference::new)));
+                let viewpoint = *app.world.resource::<Viewpoint>();
+                let reference = reference.map(|image| Reference::new(image, viewpoint));
+                app.world.insert_resource(Instrument::against(reference));
                 self.run_frames(app);
             }
             Err(why) => (self.wake)(Wake::OpenFailed(why)),
