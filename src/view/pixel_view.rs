@@ -13,7 +13,7 @@ use crate::scene::SceneBounds;
 use crate::scene::color::{luminance, srgb_from_linear};
 use crate::sync::{Redone, Traceable};
 use crate::trace::first::{Cost, FirstSurface, Grid, costs, first_surfaces};
-use crate::trace::{Film, noise};
+use crate::trace::{Film, Viewpoint, noise};
 use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec3};
 use std::sync::atomic::Ordering;
@@ -104,8 +104,6 @@ pub fn choose_pixel_view(
     input: Res<Input>,
     instrument: Res<Instrument>,
     mut view: ResMut<PixelView>,
-    mut budget: ResMut<FrameBudget>,
-    mut display: ResMut<Display>,
     mut notices: ResMut<Notices>,
 ) {
     let mut wanted = *view;
@@ -117,8 +115,23 @@ pub fn choose_pixel_view(
         }
         notices.0.push(Notice::Text(format!("view: {}", wanted.title())));
     }
-    if view.set_if_neq(wanted) {
-        budget.develop = wanted == PixelView::Beauty;
+    view.set_if_neq(wanted);
+}
+
+/// Light is developed if it is wanted, or if nobody knows the error of what is seen.
+pub fn choose_developed(
+    view: Res<PixelView>,
+    instrument: Res<Instrument>,
+    viewpoint: Res<Viewpoint>,
+    film: Res<Film>,
+    mut budget: ResMut<FrameBudget>,
+    mut display: ResMut<Display>,
+) {
+    let is_known =
+        instrument.reference.as_ref().is_some_and(|reference| reference.is_of(&viewpoint, film.size()));
+    let develop = *view == PixelView::Beauty || *view == PixelView::Error && !is_known;
+    if budget.develop != develop {
+        budget.develop = develop;
         // The picture is to be developed again.
         display.set_changed();
     }
@@ -164,7 +177,7 @@ pub struct DepthWanted(pub bool);
 
 /// Makes the picture of anything but light.
 pub fn develop_pixel_view(
-    view: Res<PixelView>,
+    (view, budget): (Res<PixelView>, Res<FrameBudget>),
     film: Res<Film>,
     first: Res<FirstHits>,
     bounds: Option<Res<SceneBounds>>,
@@ -172,8 +185,9 @@ pub fn develop_pixel_view(
     mut legend: ResMut<CurrentLegend>,
     mut picture: ResMut<Picture>,
 ) {
-    if *view == PixelView::Beauty {
-        legend.set_if_neq(CurrentLegend(None));
+    if budget.develop {
+        let unknown = Legend { title: "no reference of this view: the picture", range: None };
+        legend.set_if_neq(CurrentLegend((*view == PixelView::Error).then_some(unknown)));
         return;
     }
     if !(view.is_changed() || film.is_changed() || first.is_changed()) {
@@ -302,6 +316,7 @@ fn not_finite(film: &Film) -> Vec<[u8; 3]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::instrument::Reference;
     use super::*;
 
     #[test]
@@ -344,5 +359,37 @@ mod tests {
         assert_eq!(colors, [[255; 3], [35; 3], [0; 3]]);
         near_bright(&[f32::INFINITY; 3], 1.0);
         assert_eq!(linear(&[]).0.len(), 0);
+    }
+    #[test]
+    fn where_there_is_no_reference_the_picture_is_shown_and_told() {
+        let mut world = World::new();
+        let size = UVec2::new(2, 1);
+        let image = LinearImage { size, pixels: vec![Vec3::ONE; 2] };
+        world.insert_resource(Instrument::against(Some(Reference::new(image, Viewpoint::default()))));
+        world.insert_resource(PixelView::Error);
+        world.insert_resource(Film::new(size, 0));
+        world.init_resource::<Viewpoint>();
+        world.init_resource::<FrameBudget>();
+        world.init_resource::<Display>();
+        world.init_resource::<FirstHits>();
+        world.init_resource::<CurrentLegend>();
+        world.init_resource::<Picture>();
+        let mut schedule = Schedule::default();
+        schedule.add_systems((choose_developed, develop_pixel_view).chain());
+        let mut shown = |world: &mut World| {
+            schedule.run(world);
+            let legend = world.resource::<CurrentLegend>().0.clone().unwrap();
+            (world.resource::<FrameBudget>().develop, legend.range.is_some(), legend.title)
+        };
+        assert_eq!(shown(&mut world), (false, true, PixelView::Error.title()));
+        let moved = glam::DAffine3::from_translation(glam::DVec3::X);
+        world.insert_resource(Viewpoint::new(&moved, crate::scene::Camera::default().projection));
+        let (develops, has_scale, title) = shown(&mut world);
+        assert!(develops && !has_scale && title.contains("no reference"), "{title}");
+        world.insert_resource(Viewpoint::default());
+        world.insert_resource(Film::new(size + 1, 0));
+        assert!(shown(&mut world).0, "of another size");
+        world.insert_resource(Film::new(size, 0));
+        assert_eq!(shown(&mut world), (false, true, PixelView::Error.title()), "back again");
     }
 }

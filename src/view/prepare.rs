@@ -16,8 +16,8 @@ use super::input::Input;
 use super::instrument::{Instrument, note_noise};
 use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
 use super::pixel_view::{
-    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_pixel_view, develop_pixel_view,
-    refine_first_hits,
+    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_developed, choose_pixel_view,
+    develop_pixel_view, refine_first_hits,
 };
 use super::plain::{Plain, develop_plain};
 use super::playing::{Clock, advance};
@@ -102,6 +102,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
     app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
     app.add_systems((finish_sync, mark).chain().in_set(FrameSystems::Sync).after(reset_film));
+    app.add_systems(choose_developed.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems(count_held.in_set(FrameSystems::Trace));
     app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
@@ -115,7 +116,6 @@ pub fn status(app: &App) -> Status {
     let settings = world.resource::<RenderSettings>();
     let display = world.resource::<Display>();
     let shown = world.resource::<Shown>();
-    let shows_light = *world.resource::<PixelView>() == PixelView::Beauty;
     Status {
         samples_per_pixel: stats.samples_per_pixel,
         sample_target: world.resource::<FrameBudget>().sample_target,
@@ -131,7 +131,7 @@ pub fn status(app: &App) -> Status {
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         kept: shown.kept_share(world.resource::<Film>().complete_samples(), stats.done),
-        smoothed: shown.is_smoothed() && shows_light,
+        smoothed: shown.is_smoothed() && world.resource::<FrameBudget>().develop,
         region: world.resource::<FrameBudget>().region.map(|[min, max]| {
             let size = max - min;
             [min.x, min.y, size.x, size.y]
