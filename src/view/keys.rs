@@ -98,11 +98,12 @@ impl Viewer {
             Tap::Escape if self.ui.report => self.ui.report = false,
             Tap::Quit => event_loop.exit(),
             // What is looked at closely is the film alone: the engine is asked for it.
-            Tap::Keep | Tap::Screenshot | Tap::ScreenshotWithHud if self.is_altered() => {
+            Tap::Screenshot | Tap::ScreenshotWithHud
+                if self.is_altered() && (tap == Tap::Screenshot || self.other().is_none()) =>
+            {
                 let press = Press { tap, shift: false, cursor: self.cursor_in_picture() };
                 return self.send(Command::Tap { press, at: Instant::now() });
             }
-            Tap::Keep => self.keep_picture(self.picture.clone()),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {
                     screen.toggle_full_screen();

@@ -24,7 +24,7 @@ pub fn develop_plain(
     mut plain: ResMut<Plain>,
 ) {
     for press in &input.taps {
-        if !matches!(press.tap, Tap::Keep | Tap::Screenshot | Tap::ScreenshotWithHud) {
+        if !matches!(press.tap, Tap::Screenshot | Tap::ScreenshotWithHud) {
             continue;
         }
         let made = if budget.develop {

@@ -94,6 +94,12 @@ impl Viewer {
         if self.ui.pointer(DVec2::new(to.x, to.y), display) {
             self.redraw();
         }
+        if let (None, Some(screen)) = (self.drag, &self.screen) {
+            self.split = (to.x / f64::from(screen.size().x)).clamp(0.0, 1.0);
+            if self.compared.split {
+                self.redraw();
+            }
+        }
         let (Some((drag, start)), Some(screen)) = (self.drag, &self.screen) else {
             return;
         };

@@ -22,6 +22,7 @@ use super::pixel_view::{
 use super::plain::{Plain, develop_plain};
 use super::playing::{Clock, advance};
 use super::recipe::recipe;
+use super::sides::{Compared, Sides, change_sides, develop_side};
 use super::status::{Machine, Status};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
 use crate::image::Display;
@@ -63,6 +64,8 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Clock>();
     app.world.init_resource::<Notices>();
     app.world.init_resource::<Plain>();
+    app.world.init_resource::<Sides>();
+    app.world.init_resource::<Compared>();
     app.world.init_resource::<Held>();
     app.world.init_resource::<Bookmarks>();
     app.world.init_resource::<Pending>();
@@ -88,7 +91,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
         (
             change_region,
             change_settings,
-            (change_shown, develop_plain).chain(),
+            (change_sides, change_shown, develop_plain).chain(),
             save_picture,
             change_display,
             (change_pause, advance).chain(),
@@ -105,7 +108,9 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.add_systems(choose_developed.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems(count_held.in_set(FrameSystems::Trace));
     app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
-    app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
+    app.add_systems(
+        (note_noise, develop_pixel_view, develop_side, draw_layer).chain().in_set(FrameSystems::Present),
+    );
 }
 
 /// What the window is to show of `app` beside the picture.

@@ -76,6 +76,12 @@ impl Editor {
         self.shown.clone()
     }
 
+    /// Whether there is something that the keys change.
+    #[must_use]
+    pub fn has_selection(&self) -> bool {
+        self.selected.is_some()
+    }
+
     /// What was changed, in the order in which it was first.
     #[must_use]
     pub fn edited(&self) -> (&[(Entity, usize)], &[(Entity, Entity)]) {

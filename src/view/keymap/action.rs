@@ -173,6 +173,10 @@ pub enum Tap {
     Reload,
     /// Keep the picture to compare with.
     Keep,
+    /// Show the picture to compare with beside this one, or not.
+    Split,
+    /// Compare with the reference or with the kept picture.
+    OtherSide,
     /// Close what is open.
     Escape,
     /// End the program.

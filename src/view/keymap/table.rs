@@ -131,7 +131,12 @@ pub const TABLE: &[Section] = &[
                 &[tap("pixel_view", Tap::PixelView, &["V"])],
             ),
             row("hold: the kept picture, or the reference", &[hold("compare", Hold::Compare, &["K"])]),
+            row("that one left of the cursor, this one right", &[tap("split", Tap::Split, &["Shift+K"])]),
             row("keep this picture to compare with", &[tap("keep", Tap::Keep, &["Ctrl+K"])]),
+            row(
+                "compare with the reference / the kept picture",
+                &[tap("other_side", Tap::OtherSide, &["Ctrl+Shift+K"])],
+            ),
             row("keep old samples while moving, or not", &[tap("keep_samples", Tap::KeepSamples, &["Y"])]),
             row("smooth the first second, or not", &[tap("smooth", Tap::Smooth, &["U"])]),
             row(

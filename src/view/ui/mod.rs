@@ -36,6 +36,8 @@ pub struct Content<'a> {
     pub loading: Option<&'a str>,
     /// A line that passes.
     pub notice: &'a str,
+    /// Which other picture is shown, and up to which part of the width.
+    pub compared: Option<(&'static str, f64)>,
     /// For the help.
     pub keys: &'a Keymap,
     /// For the help.
@@ -177,6 +179,7 @@ impl Ui {
     pub fn is_bare(&self, content: &Content) -> bool {
         let silent = content.notice.is_empty()
             && content.loading.is_none()
+            && content.compared.is_none()
             && content
                 .status
                 .is_none_or(|status| status.debug == DebugStatus::default() && status.edit.is_none());
@@ -209,6 +212,13 @@ impl Ui {
         }
         if let Some(prompt) = &self.prompt {
             open::show(context, prompt);
+        }
+        if let Some((name, part)) = content.compared {
+            // Below the status, also where that is as wide as the window.
+            card(context, "compared", Align2::CENTER_TOP, vec2(0.0, 7.0 * style::MARGIN), |ui| {
+                let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
+                ui.label(RichText::new(text).color(style::ACCENT));
+            });
         }
         if let Some(text) = content.loading {
             card(context, "loading", Align2::CENTER_CENTER, vec2(0.0, 0.0), |ui| {
@@ -252,6 +262,7 @@ mod tests {
             measured: Measured::default(),
             loading: None,
             notice: "saved cornell_1.png",
+            compared: None,
             keys: &keys,
             letters: &letters,
         };
@@ -296,6 +307,7 @@ mod tests {
             measured: Measured::default(),
             loading: None,
             notice: "",
+            compared: None,
             keys: &keys,
             letters: &letters,
         };
