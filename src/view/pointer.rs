@@ -21,7 +21,11 @@ impl Viewer {
     /// A button went down or up.
     pub(super) fn button(&mut self, button: MouseButton, down: bool) {
         if self.ui.button(button, down) {
-            return self.redraw();
+            self.redraw();
+            // What began beside the cards ends wherever the button is let go.
+            if down || self.drag.is_none() {
+                return;
+            }
         }
         let drag = match button {
             MouseButton::Right => Drag::Look,
