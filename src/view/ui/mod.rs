@@ -135,12 +135,24 @@ impl Ui {
         });
         let Some(pos) = pos.or(self.context.pointer_latest_pos()) else { return false };
         let over = self.context.layer_id_at(pos).is_some_and(|layer| layer.order != egui::Order::Background);
+        if pressed && !over {
+            self.let_go();
+        }
         if button != MouseButton::Left || !(over || self.context.is_using_pointer()) {
             return false;
         }
         let button = PointerButton::Primary;
         self.events.push(Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE });
         true
+    }
+
+    /// The keyboard is the picture's again; a number that is being typed counts as it is.
+    fn let_go(&self) {
+        self.context.memory_mut(|memory| {
+            if let Some(id) = memory.focused() {
+                memory.surrender_focus(id);
+            }
+        });
     }
 
     /// Whether what is typed goes into a card.
@@ -252,8 +264,11 @@ pub fn card(
 
 #[cfg(test)]
 mod tests {
+    use super::super::edit::EditStatus;
+    use super::super::edit::property::Row;
     use super::super::status::tests::status;
     use super::*;
+    use std::sync::Arc;
 
     fn drawn(size: UVec2, display: f64, change: impl FnOnce(&mut Ui), background: u8) -> Vec<u8> {
         let (status, keys, letters) = (status(), Keymap::default(), Letters::default());
@@ -323,5 +338,50 @@ mod tests {
         let size = UVec2::new(960, 540);
         let open = |ui: &mut Ui| ui.help = true;
         assert_eq!(drawn(size, 1.0, open, 50), drawn(size, 1.0, open, 50));
+    }
+    #[test]
+    fn a_click_into_the_picture_takes_the_keyboard_from_the_card() {
+        let mut status = status();
+        let row = |i| Row {
+            property: Property::Position(i),
+            label: "x",
+            value: 1.0,
+            step: 0.1,
+            grows: false,
+            range: [-1e3, 1e3],
+        };
+        let edited = EditStatus { rows: (0..3).map(row).collect(), ..EditStatus::default() };
+        status.edit = Some(Arc::new(edited));
+        let (keys, letters) = (Keymap::default(), Letters::default());
+        let content = Content {
+            status: Some(&status),
+            measured: Measured::default(),
+            loading: None,
+            notice: "",
+            compared: None,
+            keys: &keys,
+            letters: &letters,
+        };
+        let size = UVec2::new(640, 400);
+        let mut ui = Ui::default();
+        let mut frame = |ui: &mut Ui| ui.draw(&mut vec![0; 640 * 400 * 4], size, 1.0, &content);
+        let click = |ui: &mut Ui, frame: &mut dyn FnMut(&mut Ui), at: DVec2| {
+            let mut taken = false;
+            for pressed in [true, false] {
+                ui.pointer(at, (1.0, size));
+                taken |= ui.button(MouseButton::Left, pressed);
+                frame(ui);
+            }
+            taken
+        };
+        frame(&mut ui);
+        // Wherever on the card the numbers are.
+        let mut down = (0..40).map(|i| DVec2::new(600.0, 100.0 + 5.0 * f64::from(i)));
+        assert!(down.any(|at| click(&mut ui, &mut frame, at) && ui.takes_text()), "no number takes text");
+        ui.key(KeyCode::Digit7, Some("7"));
+        frame(&mut ui);
+        assert!(!click(&mut ui, &mut frame, DVec2::new(50.0, 300.0)), "the picture gets it as well");
+        assert!(!ui.takes_text());
+        assert_eq!(ui.edits.last().map(|(_, value)| *value), Some(7.0), "what was typed counts");
     }
 }
