@@ -28,8 +28,8 @@ const SAMPLES: u32 = 32;
 pub struct Debug {
     /// Whether clicks pin pixels.
     pinning: bool,
-    /// The pixel that is explained, and from where it was looked at.
-    pinned: Option<(UVec2, Viewpoint)>,
+    /// The pixel that is explained.
+    pinned: Option<Pinned>,
     boxes: Boxes,
     /// Level to return to.
     level: u32,
@@ -38,6 +38,24 @@ pub struct Debug {
     step: usize,
     told: Option<Arc<Told>>,
     statistics: Option<Arc<Statistics>>,
+}
+
+/// A pixel of a picture, and from where that was seen.
+#[derive(Clone, Copy, Debug)]
+struct Pinned {
+    pixel: UVec2,
+    size: UVec2,
+    viewpoint: Viewpoint,
+}
+
+impl Pinned {
+    /// The pixel that shows the same in a picture of another size, if that reaches so far.
+    fn at(&self, size: UVec2) -> Option<UVec2> {
+        let (old, new) = (self.size.as_dvec2(), size.as_dvec2());
+        // Pictures of all sizes show as much from top to bottom, around the same middle.
+        let place = (self.pixel.as_dvec2() + 0.5 - old * 0.5) * (new.y / old.y) + new * 0.5;
+        (place.cmpge(DVec2::ZERO).all() && place.cmplt(new).all()).then(|| place.as_uvec2())
+    }
 }
 
 /// What is told about the pinned pixel.
@@ -133,8 +151,9 @@ impl Debug {
     }
 
     fn pin(&mut self, cursor: DVec2, viewpoint: &Viewpoint, size: UVec2) {
-        let pixel = (cursor * size.as_dvec2()).as_uvec2().min(size.max(UVec2::ONE) - 1);
-        self.pinned = Some((pixel, *viewpoint));
+        let size = size.max(UVec2::ONE);
+        let pixel = (cursor * size.as_dvec2()).as_uvec2().min(size - 1);
+        self.pinned = Some(Pinned { pixel, size, viewpoint: *viewpoint });
         self.step = 0;
     }
 }
@@ -183,14 +202,14 @@ pub fn explain_pinned(
         drawn.extend(boxes);
         debug.statistics = Some(Arc::new(statistics));
     }
-    debug.told =
-        debug.pinned.filter(|(pixel, _)| pixel.cmplt(seen.settings.size).all()).map(|(pixel, viewpoint)| {
-            let scene = TraceScene { viewpoint: &viewpoint, ..seen };
-            let far = bounds.map_or(10.0, |bounds| 2.0 * bounds.radius as f32);
-            let first = film.first_sample();
-            let explanation = explain(&scene, pixel, first..first.saturating_add(SAMPLES), far);
-            Arc::new(tell(&seen.geometry.tlas, explanation))
-        });
+    let pinned = debug.pinned.and_then(|pinned| Some((pinned.at(seen.settings.size)?, pinned.viewpoint)));
+    debug.told = pinned.map(|(pixel, viewpoint)| {
+        let scene = TraceScene { viewpoint: &viewpoint, ..seen };
+        let far = bounds.map_or(10.0, |bounds| 2.0 * bounds.radius as f32);
+        let first = film.first_sample();
+        let explanation = explain(&scene, pixel, first..first.saturating_add(SAMPLES), far);
+        Arc::new(tell(&seen.geometry.tlas, explanation))
+    });
     if let Some(told) = &debug.told {
         drawn.extend(ray_lines(&told.explanation));
         let steps = &told.steps[debug.order as usize];
@@ -280,4 +299,28 @@ pub fn draw_layer(
     made.draw(&lines.0, &viewpoint, surfaces.map(crate::trace::first::Grid::cells));
     made.draw(&marks.lines(&viewpoint, size), &viewpoint, None);
     layer.0 = Some(Arc::new(made));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pinned_pixel_is_the_same_place_after_a_resize() {
+        let viewpoint = Viewpoint::default();
+        let sizes = [UVec2::new(320, 240), UVec2::new(640, 480), UVec2::new(300, 480), UVec2::new(777, 131)];
+        for pixel in [UVec2::new(160, 120), UVec2::new(130, 31), UVec2::new(201, 239)] {
+            let pinned = Pinned { pixel, size: sizes[0], viewpoint };
+            let direction = |pixel: UVec2, size: UVec2| viewpoint.ray(pixel.as_vec2() + 0.5, size).direction;
+            let wanted = direction(pixel, sizes[0]);
+            assert_eq!(pinned.at(sizes[0]), Some(pixel));
+            for size in sizes {
+                let off = direction(pinned.at(size).unwrap(), size).distance(wanted);
+                // Within a pixel.
+                assert!(off < 1.2 / size.y as f32, "{pixel} {size} {off}");
+            }
+        }
+        let corner = Pinned { pixel: UVec2::ZERO, size: sizes[0], viewpoint };
+        assert_eq!(corner.at(UVec2::new(100, 240)), None, "beside the picture");
+    }
 }
