@@ -1,6 +1,7 @@
 //! The picture that this one is compared with: a reference, or one that was kept.
 
 use super::controls::{Notice, Notices};
+use super::debug::Debug;
 use super::edit::Editor;
 use super::input::Input;
 use super::instrument::Instrument;
@@ -111,7 +112,7 @@ pub fn change_sides(
     (film, preview, picture): (Res<Film>, Res<Preview>, Res<Picture>),
     budget: Res<FrameBudget>,
     instrument: Res<Instrument>,
-    editor: Res<Editor>,
+    (editor, debug): (Res<Editor>, Res<Debug>),
     mut sides: ResMut<Sides>,
     mut notices: ResMut<Notices>,
 ) {
@@ -140,7 +141,8 @@ pub fn change_sides(
                 sides.split = !sides.split;
                 continue;
             }
-            Tap::Escape if sides.split && !editor.has_selection() => {
+            // One thing at a time is closed.
+            Tap::Escape if sides.split && !editor.has_selection() && !debug.is_open() => {
                 sides.split = false;
                 continue;
             }
@@ -209,6 +211,7 @@ mod tests {
         world.init_resource::<Picture>();
         world.init_resource::<Display>();
         world.init_resource::<Editor>();
+        world.init_resource::<Debug>();
         world.init_resource::<Sides>();
         world.init_resource::<Compared>();
         world.init_resource::<Notices>();

@@ -4,6 +4,7 @@ pub mod boxes;
 pub mod layer;
 
 use super::controls::{Notice, Notices};
+use super::edit::Editor;
 use super::edit::marks::Marks;
 use super::input::{Input, Press};
 use super::keymap::Tap;
@@ -86,6 +87,14 @@ pub struct DebugStatus {
     pub statistics: Option<Arc<Statistics>>,
 }
 
+impl DebugStatus {
+    /// Whether rays or boxes are shown.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.told.is_some() || self.boxes != Boxes::Off
+    }
+}
+
 /// What is drawn over the picture, if anything.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct CurrentLayer(pub Option<Arc<Layer>>);
@@ -101,6 +110,12 @@ impl Debug {
             boxes: self.boxes,
             statistics: self.statistics.clone(),
         }
+    }
+
+    /// Whether rays or boxes are wanted.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.pinned.is_some() || self.boxes != Boxes::Off
     }
 
     fn press(
@@ -119,6 +134,7 @@ impl Debug {
                     return Some("click a pixel to see its rays");
                 }
             }
+            Tap::Escape => (self.pinning, self.pinned, self.step, self.boxes) = (false, None, 0, Boxes::Off),
             Tap::Click if self.pinning => self.pin(press.cursor, viewpoint, size),
             Tap::Boxes => {
                 self.boxes = match self.boxes {
@@ -163,6 +179,7 @@ pub fn change_debug(
     input: Res<Input>,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
+    editor: Res<Editor>,
     mut debug: ResMut<Debug>,
     mut depth_wanted: ResMut<DepthWanted>,
     mut notices: ResMut<Notices>,
@@ -171,7 +188,9 @@ pub fn change_debug(
         let stepping = matches!(press.tap, Tap::NextStep | Tap::PreviousStep | Tap::Order);
         stepping || matches!(press.tap, Tap::Pin | Tap::Click | Tap::Boxes | Tap::LevelUp | Tap::LevelDown)
     };
-    for press in input.taps.iter().filter(ours) {
+    // One thing at a time is closed.
+    let closes = debug.is_open() && !editor.has_selection();
+    for press in input.taps.iter().filter(|press| ours(press) || press.tap == Tap::Escape && closes) {
         let levels = debug.statistics.as_ref().map_or(u32::MAX, |statistics| statistics.levels);
         if let Some(text) = debug.press(press, &viewpoint, settings.size, levels) {
             notices.0.push(Notice::Text(text.to_owned()));
