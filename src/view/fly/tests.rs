@@ -3,7 +3,6 @@
 use super::super::cameras::{
     Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
 };
-use super::super::controls::Notices;
 use super::super::input::{Command, Press};
 use super::super::keymap::Side;
 use super::super::orbit::{focus, orbit_camera};
@@ -268,4 +267,13 @@ fn focusing_makes_the_file_s_own_lens_sharp_there_and_without_a_lens_nobody_take
         assert_eq!(focus.is_some_and(|focus| focus != 50.0), lens.is_some(), "{focus:?}");
         assert_eq!(app.world.get::<Lens>(home).copied(), lens, "the file's camera is left alone");
     }
+}
+
+#[test]
+fn a_change_of_the_speed_is_told() {
+    let (mut world, mut schedule) = at_rest();
+    press(&mut world, &mut schedule, &[Tap::Faster, Tap::OpenLens]);
+    let notices = &world.resource::<Notices>().0;
+    assert_eq!(notices.first(), Some(&Notice::Text("speed: 3.00 / s".to_owned())));
+    assert_eq!(notices.len(), 2, "and silence where it stays: {notices:?}");
 }
