@@ -217,7 +217,7 @@ pub const TABLE: &[Section] = &[
             ),
             row("save the picture as .exr and .png", &[tap("save", Tap::SavePicture, &["Ctrl+S"])]),
             row("open another scene (or drop it here)", &[tap("open", Tap::Open, &["Ctrl+O"])]),
-            row("load the scene again (it is when a file changes)", &[tap("reload", Tap::Reload, &["F5"])]),
+            row("load the scene again (it is when a file changes) *", &[tap("reload", Tap::Reload, &["F5"])]),
             row("let the mouse go, close what is open", &[tap("escape", Tap::Escape, &["Escape"])]),
             row("quit", &[tap("quit", Tap::Quit, &["Ctrl+Q"])]),
         ],
