@@ -15,7 +15,7 @@ use super::chord::Letters;
 use super::debug::DebugStatus;
 use super::edit::property::Property;
 use super::keymap::Keymap;
-use super::status::{Level, Measured, Status};
+use super::status::{Level, Measured, Status, altered};
 use egui::{
     Align2, Area, Context, Event, Id, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, RichText,
     ViewportId, pos2, vec2,
@@ -190,6 +190,7 @@ impl Ui {
     #[must_use]
     pub fn is_bare(&self, content: &Content) -> bool {
         let silent = content.notice.is_empty()
+            && content.status.and_then(altered).is_none()
             && content.loading.is_none()
             && content.compared.is_none()
             && content
@@ -207,6 +208,8 @@ impl Ui {
         if let Some(status) = content.status {
             if self.level != Level::None {
                 strip::show(context, status, content.measured, self.level);
+            } else if let Some(text) = altered(status) {
+                strip::show_altered(context, &text);
             }
             if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None) {
                 legend::show(context, legend);
@@ -331,6 +334,13 @@ mod tests {
         let mut rgba = vec![77; 100 * 100 * 4];
         ui.draw(&mut rgba, UVec2::splat(100), 1.0, &content);
         assert!(rgba.iter().all(|&c| c == 77));
+        // But never a picture that is more than the film, as if it were not.
+        let smoothed = Status { smoothed: true, ..status() };
+        let content = Content { status: Some(&smoothed), ..content };
+        assert!(!ui.is_bare(&content));
+        ui.draw(&mut rgba, UVec2::splat(100), 1.0, &content);
+        let changed = rgba.iter().filter(|&&c| c != 77).count() / 4;
+        assert!((100..5000).contains(&changed), "{changed} pixels");
     }
 
     #[test]
