@@ -35,6 +35,8 @@ pub enum Property {
     Mirror,
     /// Luminance that it emits.
     Emission,
+    /// A channel of what it emits, relative to the strongest.
+    EmissionColor(usize),
 }
 
 /// A property and its value.
@@ -70,7 +72,12 @@ impl Row {
     }
 }
 
-const AXES: [[&str; 3]; 3] = [["x", "y", "z"], ["turn x", "turn y", "turn z"], ["red", "green", "blue"]];
+const AXES: [[&str; 3]; 4] = [
+    ["x", "y", "z"],
+    ["turn x", "turn y", "turn z"],
+    ["red", "green", "blue"],
+    ["emits red", "emits green", "emits blue"],
+];
 const ANY: [f64; 2] = [-1e15, 1e15];
 const UNIT: [f64; 2] = [0.0, 1.0];
 const POSITIVE: [f64; 2] = [1e-9, 1e12];
@@ -132,6 +139,13 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         }
         add(Property::Mirror, "mirror", f64::from(material.mirror.max_element()), 0.05, false, UNIT);
         add(Property::Emission, "emits", f64::from(luminance(material.emission)), 0.2, true, [0.0, 1e12]);
+        let most = f64::from(material.emission.max_element());
+        if most > 0.0 {
+            for (channel, label) in AXES[3].into_iter().enumerate() {
+                let share = f64::from(material.emission[channel]) / most;
+                add(Property::EmissionColor(channel), label, share, 0.05, false, UNIT);
+            }
+        }
     }
     rows
 }
@@ -249,6 +263,9 @@ fn set_material(material: &mut Material, property: Property, value: f32) {
     match property {
         Property::BaseColor(channel) => material.base_color[channel] = value,
         Property::Mirror => material.mirror = scaled(material.mirror, material.mirror.max_element()),
+        Property::EmissionColor(channel) => {
+            material.emission[channel] = value * material.emission.max_element();
+        }
         Property::Emission => material.emission = scaled(material.emission, luminance(material.emission)),
         Property::Roughness | Property::Metallic => {
             if let Glossy::Ggx { metallic, roughness, .. } = &mut material.glossy {
@@ -279,7 +296,8 @@ mod tests {
         let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.2), exponent: 30.0, texture: None };
         let material = world.spawn(Material { glossy: phong, ..Material::default() }).id();
         let ggx = Glossy::Ggx { metallic: 0.0, roughness: 0.5, texture: None };
-        let shiny = world.spawn(Material { glossy: ggx, ..Material::default() }).id();
+        let emission = Vec3::new(2.0, 1.0, 0.5);
+        let shiny = world.spawn(Material { glossy: ggx, emission, ..Material::default() }).id();
         let turned = DQuat::from_euler(EulerRot::ZYX, 0.3, 0.2, 0.1);
         let parent =
             world.spawn(Transform::from_parts(DVec3::new(1.0, 2.0, 3.0), turned, DVec3::splat(2.0))).id();
@@ -322,6 +340,7 @@ mod tests {
                         (row.property, new.property),
                         (Property::LightColor(_), Property::Power | Property::LightColor(_))
                             | (Property::Power, Property::LightColor(_))
+                            | (Property::EmissionColor(_), Property::Emission | Property::EmissionColor(_))
                     );
                     let expected = if old.property == row.property { wanted } else { old.value };
                     let off = (new.value - expected).abs();
