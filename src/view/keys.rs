@@ -95,6 +95,10 @@ impl Viewer {
             Tap::Report => self.ui.report = !self.ui.report,
             Tap::Open => self.ui.prompt = Some(Prompt::new("")),
             Tap::Escape => self.escape(),
+            Tap::Split => {
+                self.split = self.cursor_in_picture().x;
+                return self.pass_on(tap);
+            }
             Tap::Quit => event_loop.exit(),
             // What is looked at closely is the film alone: the engine is asked for it.
             Tap::Screenshot | Tap::ScreenshotWithHud

@@ -231,6 +231,7 @@ impl Ui {
         if let Some((name, part)) = content.compared {
             // Below the status, also where that is as wide as the window.
             card(context, "compared", Align2::CENTER_TOP, vec2(0.0, 7.0 * style::MARGIN), |ui| {
+                ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
                 let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
                 ui.label(RichText::new(text).color(style::ACCENT));
             });
