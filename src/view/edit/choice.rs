@@ -50,7 +50,8 @@ pub(super) fn pick(world: &World, cursor: DVec2, marked: bool) -> Option<Selecti
     let t_max = hit.map_or(f32::INFINITY, |hit| hit.t);
     let lamp = world.resource::<Lights>().closest(&Ray { t_max, ..ray });
     let surface = lamp.map_or(t_max, |lamp| lamp.hit.t);
-    let depth = if marked { f32::INFINITY } else { viewpoint.depth(&ray, surface) };
+    let can_hide = surface.is_finite() && !marked;
+    let depth = if can_hide { viewpoint.depth(&ray, surface) } else { f32::INFINITY };
     if let Some(entity) = lamp_near(world, cursor, depth) {
         return Some(Selection { entity, slot: 0 });
     }
@@ -84,4 +85,28 @@ fn distance(point: Vec2, [a, b]: [Vec2; 2]) -> f32 {
     let along = b - a;
     let part = ((point - a).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
     point.distance(a + along * part)
+}
+
+/// What kind of light it is; or which material of an instance that has several is meant.
+pub(super) fn kind_of(world: &World, Selection { entity, slot }: Selection) -> Option<String> {
+    if let Some(light) = world.get::<Light>(entity) {
+        return Some(light_kind(light).to_owned());
+    }
+    let materials = &world.get::<Instance>(entity)?.materials;
+    let name = materials.get(slot).and_then(|&material| world.get::<Name>(material));
+    let name = name.map_or_else(|| format!("material {}", slot + 1), |name| name.as_str().to_owned());
+    (materials.len() > 1).then_some(name)
+}
+
+fn light_kind(light: &Light) -> &'static str {
+    match light {
+        Light::Point { .. } => "point light",
+        Light::Spot { .. } => "spot light",
+        Light::Directional { .. } => "sun",
+        Light::Segment { .. } => "segment light",
+        Light::Parallelogram { .. } => "parallelogram light",
+        Light::Disk { .. } => "disk light",
+        Light::Sphere { .. } => "sphere light",
+        Light::Environment { .. } | Light::Sky { .. } => "sky",
+    }
 }

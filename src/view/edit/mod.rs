@@ -15,9 +15,9 @@ use crate::scene::path::path_of;
 use crate::scene::{Hidden, SceneBounds};
 use crate::sync::Redone;
 use bevy_ecs::prelude::*;
-use choice::{pick, stepped, things};
+use choice::{kind_of, pick, stepped, things};
 use glam::DVec2;
-use property::{Property, Row, material_of, rows, set};
+use property::{Property, Row, rows, set};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use undo::{Undo, remember, undo};
@@ -55,8 +55,8 @@ struct Selection {
 pub struct EditStatus {
     /// Its name.
     pub name: String,
-    /// That of its material, if it has several.
-    pub material: Option<String>,
+    /// What kind of light it is; or which of its materials is meant, if it has several.
+    pub kind: Option<String>,
     /// The how manieth of how many things it is, in the order of the keys.
     pub place: [usize; 2],
     /// Its numbers.
@@ -242,10 +242,9 @@ pub fn finish_sync(world: &mut World) {
         editor.row = editor.row.min(rows.len().saturating_sub(1));
         let things = things(world);
         let here = things.iter().position(|&thing| thing == selection);
-        let has_several = things.iter().filter(|thing| thing.entity == entity).count() > 1;
         Arc::new(EditStatus {
             name: path_of(world, entity).join(" / "),
-            material: has_several.then(|| material_name(world, selection)),
+            kind: kind_of(world, selection),
             place: [here.map_or(0, |here| here + 1), things.len()],
             rows,
             row: editor.row,
@@ -254,11 +253,6 @@ pub fn finish_sync(world: &mut World) {
         })
     });
     world.insert_resource(editor);
-}
-
-fn material_name(world: &World, Selection { entity, slot }: Selection) -> String {
-    let name = material_of(world, entity, slot).and_then(|material| world.get::<Name>(material));
-    name.map_or_else(|| format!("material {}", slot + 1), |name| name.as_str().to_owned())
 }
 
 fn told(before: Redone, now: Redone, time: Duration, lost: f64) -> String {

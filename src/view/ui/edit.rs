@@ -12,8 +12,8 @@ pub fn show(context: &Context, status: &EditStatus, changed: &mut Vec<(Property,
         |ui| {
             style::frame().show(ui, |ui| {
                 ui.label(RichText::new(&status.name).color(ACCENT));
-                if let Some(material) = &status.material {
-                    ui.label(material);
+                if let Some(kind) = &status.kind {
+                    ui.label(kind);
                 }
                 let [here, all] = status.place;
                 ui.label(RichText::new(format!("{here} of {all}")).color(FAINT).small());
