@@ -2,6 +2,7 @@
 
 use super::Camera;
 use bevy_ecs::prelude::*;
+use std::collections::HashMap;
 
 /// The names from the root down to `entity`; of siblings with one name the second is `name#2`, and so on.
 #[must_use]
@@ -41,13 +42,13 @@ fn labels(world: &World, parent: Option<Entity>) -> Vec<(Entity, String)> {
             .collect(),
     };
     siblings.sort_by_key(|entity| entity.index_u32());
-    let mut seen: Vec<&str> = Vec::new();
+    let mut seen: HashMap<&str, usize> = HashMap::new();
     let mut labelled = Vec::new();
     for entity in siblings {
         let name = world.get::<Name>(entity).map_or("", Name::as_str);
-        seen.push(name);
-        let number = seen.iter().filter(|other| **other == name).count();
-        let label = if number == 1 { name.to_owned() } else { format!("{name}#{number}") };
+        let number = seen.entry(name).or_default();
+        *number += 1;
+        let label = if *number == 1 { name.to_owned() } else { format!("{name}#{number}") };
         labelled.push((entity, label));
     }
     labelled
