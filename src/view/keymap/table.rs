@@ -174,7 +174,7 @@ pub const TABLE: &[Section] = &[
         &[
             row("select what is under the cursor", &[tap("select", Tap::Select, &["M"])]),
             row(
-                "thing before, after, lights first, hidden too (Shift: ten)",
+                "thing before, after; lights first (Shift: ten)",
                 &[
                     again("previous_thing", Tap::PreviousThing, &["Ctrl+PageUp"]),
                     again("next_thing", Tap::NextThing, &["Ctrl+PageDown", "Ctrl+M"]),

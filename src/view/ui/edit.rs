@@ -46,7 +46,7 @@ pub fn show(context: &Context, status: &EditStatus, changed: &mut Vec<(Property,
 /// What a point of the mouse adds.
 fn speed(row: &Row) -> f64 {
     let step = match row.grows {
-        true if row.value == 0.0 => row.step * 1e-3,
+        true if row.value == 0.0 => row.step * 0.1,
         true => row.step * row.value.abs(),
         false => row.step,
     };
