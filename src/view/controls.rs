@@ -3,6 +3,7 @@
 use super::flags::{camera_flags, shell_line};
 use super::input::Input;
 use super::keymap::{Hold, Tap};
+use super::sides::Sides;
 use crate::image::develop::exposure_for;
 use crate::image::{Display, ToneMap, save};
 use crate::open::SceneOrigin;
@@ -101,11 +102,12 @@ fn step_exposure(exposure: f32, thirds: f32) -> f32 {
 /// Whether old samples are kept while moving, and whether the first second is smoothed.
 pub fn change_shown(
     input: Res<Input>,
+    sides: Res<Sides>,
     mut shown: ResMut<Shown>,
     mut display: ResMut<Display>,
     mut notices: ResMut<Notices>,
 ) {
-    let compares = input.is_held(Hold::Compare);
+    let compares = input.is_held(Hold::Compare) || sides.are_split();
     if shown.hold_smoothing != compares {
         shown.hold_smoothing = compares;
     }

@@ -10,17 +10,18 @@ use super::plain::Plain;
 use super::playing::Clock;
 use super::prepare::{prepare, status};
 use super::reload::{is_sky, load_again, open_other, set_sky};
+use super::sides::{Compared, Sides};
 use super::status::Status;
 use super::watch::{PAUSE, SceneWatch};
 use crate::app::{App, FrameBudget, FrameStats};
+use crate::image::Picture;
 use crate::image::compare::LinearImage;
-use crate::image::develop::develop_image;
-use crate::image::{Display, Picture};
 use crate::load::Watcher;
 use crate::open::SceneOrigin;
 use crate::preview::Preview;
 use crate::shown::Shown;
 use crate::sync::Redone;
+use crate::trace::Viewpoint;
 use bevy_ecs::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -60,8 +61,6 @@ pub enum Wake {
     Copy(String),
     /// Another scene is shown now, of this name.
     Opened(String),
-    /// The reference, developed, to compare with.
-    Reference(Picture),
 }
 
 /// The latest that the engine made; what the window has not taken is overwritten.
@@ -75,6 +74,8 @@ pub struct Published {
     pub layer: Option<Arc<Layer>>,
     /// What is loading, and how far it is.
     pub loading: Option<String>,
+    /// What the picture is compared with.
+    pub compared: Compared,
     /// For the status lines. `None` until the scene is open.
     pub status: Option<Status>,
     /// Whether the view is changing, so that pictures are to be shown at once.
@@ -114,12 +115,9 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         // A bug in a frame must end in a message, not in a window that never changes again.
         let outcome = catch_unwind(AssertUnwindSafe(|| match open(self.watcher(&self.scene)) {
             Ok(mut app) => {
-                let reference = self.reference.take();
-                if let Some(image) = &reference {
-                    let rgba = develop_image(image, app.world.resource::<Display>());
-                    (self.wake)(Wake::Reference(Picture { size: image.size, rgba, version: 0 }));
-                }
-                app.world.insert_resource(Instrument::against(reference.map(Reference::new)));
+                let viewpoint = *app.world.resource::<Viewpoint>();
+                let reference = self.reference.take().map(|image| Reference::new(image, viewpoint));
+                app.world.insert_resource(Instrument::against(reference));
                 self.run_frames(app);
             }
             Err(why) => (self.wake)(Wake::OpenFailed(why)),
@@ -178,7 +176,11 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 wanted = wanted.or(Some(None));
             }
             if let Some(path) = wanted {
-                if let Some(other) = self.replaced(&mut app, path) {
+                if let Some(mut other) = self.replaced(&mut app, path) {
+                    // What was kept is of whatever scene it was.
+                    if let Some(sides) = app.world.remove_resource::<Sides>() {
+                        other.world.insert_resource(sides);
+                    }
                     app = other;
                     prepare(&mut app, &self.interrupt);
                 }
@@ -303,7 +305,10 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             _ => false,
         };
         published.layer = layer;
-        let news = has_picture || !same_layer || published.status.as_ref() != Some(&status);
+        let compared = app.world.resource::<Compared>();
+        let same_side = compared.is(&published.compared);
+        published.compared.clone_from(compared);
+        let news = has_picture || !same_layer || !same_side || published.status.as_ref() != Some(&status);
         published.status = Some(status);
         published.moving = moving;
         drop(published);

@@ -3,9 +3,11 @@
 //! Cameras of the file are never touched: the first motion spawns a free camera where the active one
 //! is. So a camera may hang anywhere in a hierarchy, and Enter finds it as the file has it.
 
+use super::controls::{Notice, Notices};
 use super::input::{Drag, Input};
 use super::keymap::{Hold, Tap};
 use super::orbit::{Navigation, pivot_depth};
+use super::status::significant;
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Projection, Transform};
 use bevy_ecs::prelude::*;
 use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot};
@@ -81,13 +83,18 @@ pub fn take_off(
     free: Query<Entity, With<FlyCamera>>,
     mut commands: Commands,
 ) {
-    let moves = input.has_motion() || input.taps.iter().any(|press| press.tap.changes_free_camera());
-    if !moves || free.contains(active.0) {
+    if free.contains(active.0) {
         return;
     }
     let Ok((camera, pose, lens)) = cameras.get(active.0) else {
         return;
     };
+    // Focusing changes a lens, and without one nothing that is seen.
+    let focuses = lens.is_some() && input.count(Tap::Focus) > 0;
+    let changes = input.taps.iter().any(|press| press.tap.changes_free_camera());
+    if !(input.has_motion() || changes || focuses) {
+        return;
+    }
     let state = FlyCameraState::of(pose.0.matrix3);
     let bundle = (*camera, Transform(pose.0), *pose, state);
     let entity = match free.iter().next() {
@@ -165,10 +172,12 @@ pub fn fly_camera(
 }
 
 /// Changes the base speed: ×1.1 per notch of the wheel, ×1.5 per key press.
-pub fn change_speed(input: Res<Input>, mut speed: ResMut<FlySpeed>) {
+pub fn change_speed(input: Res<Input>, mut speed: ResMut<FlySpeed>, mut notices: ResMut<Notices>) {
     let presses = input.count(Tap::Faster) as f64 - input.count(Tap::Slower) as f64;
     let factor = 1.1_f64.powf(input.wheel) * 1.5_f64.powf(presses);
-    speed.set_if_neq(FlySpeed((speed.0 * factor).clamp(1e-12, 1e12)));
+    if speed.set_if_neq(FlySpeed((speed.0 * factor).clamp(1e-12, 1e12))) {
+        notices.0.push(Notice::Text(format!("speed: {} / s", significant(speed.0, 3))));
+    }
 }
 
 #[cfg(test)]

@@ -108,6 +108,8 @@ impl Tap {
         matches!(
             self,
             Self::Select
+                | Self::PreviousThing
+                | Self::NextThing
                 | Self::Escape
                 | Self::PreviousRow
                 | Self::NextRow

@@ -1,5 +1,6 @@
 //! The error instrument: how the noise falls, when it will have fallen, and the true error where it is known.
 
+use super::controls::{Notice, Notices};
 use crate::app::FrameStats;
 use crate::image::compare::LinearImage;
 use crate::sync::Redone;
@@ -7,6 +8,7 @@ use crate::trace::convergence::{Convergence, PowerLaw};
 use crate::trace::noise::relative_error;
 use crate::trace::{Film, RenderSettings, Viewpoint};
 use bevy_ecs::prelude::*;
+use glam::UVec2;
 use std::sync::Arc;
 
 /// One look at a growing picture.
@@ -52,22 +54,42 @@ pub struct Reference {
     /// The picture.
     pub image: LinearImage,
     truth: Vec<f64>,
-    viewpoint: Option<Viewpoint>,
+    viewpoint: Viewpoint,
+    /// Whether it was said that the picture is of another size.
+    said: bool,
 }
 
 impl Reference {
-    /// Of the view that the window opens with.
+    /// Of what is seen from `viewpoint`: where the window opens.
     #[must_use]
-    pub fn new(image: LinearImage) -> Self {
-        Self { truth: image.luminances(), image, viewpoint: None }
+    pub fn new(image: LinearImage, viewpoint: Viewpoint) -> Self {
+        Self { truth: image.luminances(), image, viewpoint, said: false }
+    }
+
+    /// Whether it is of this view, in this size.
+    #[must_use]
+    pub fn is_of(&self, viewpoint: &Viewpoint, size: UVec2) -> bool {
+        self.viewpoint == *viewpoint && self.image.size == size
     }
 
     /// Relative error of `film`, if it is of the same view and size.
-    fn error(&mut self, film: &Film, viewpoint: &Viewpoint) -> Option<f64> {
-        let same_view = self.viewpoint.get_or_insert(*viewpoint) == viewpoint;
-        (same_view && film.size() == self.image.size)
+    fn error(&self, film: &Film, viewpoint: &Viewpoint) -> Option<f64> {
+        self.is_of(viewpoint, film.size())
             .then(|| relative_error(&LinearImage::of(film).luminances(), &self.truth, film.size()))
             .flatten()
+    }
+
+    /// Says once that a picture of this size cannot be measured.
+    fn complain(&mut self, size: UVec2) -> Option<Notice> {
+        if self.said || self.image.size == size {
+            return None;
+        }
+        self.said = true;
+        let own = self.image.size;
+        Some(Notice::Text(format!(
+            "the reference has {} × {} pixels, the picture {} × {}: no true error",
+            own.x, own.y, size.x, size.y
+        )))
     }
 }
 
@@ -111,6 +133,7 @@ pub fn note_noise(
     film: Res<Film>,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
+    mut notices: ResMut<Notices>,
 ) {
     let instrument = instrument.bypass_change_detection();
     if instrument.resets != redone.resets {
@@ -132,7 +155,8 @@ pub fn note_noise(
     instrument.noted = stats.noise_samples;
     let seconds = (stats.trace_seconds - instrument.start_seconds).max(1e-6);
     let samples = stats.samples_per_pixel;
-    let error = instrument.reference.as_mut().and_then(|reference| reference.error(&film, &viewpoint));
+    let error = instrument.reference.as_ref().and_then(|reference| reference.error(&film, &viewpoint));
+    notices.0.extend(instrument.reference.as_mut().and_then(|reference| reference.complain(film.size())));
     instrument.convergence.note(f64::from(stats.noise_samples), noise);
     let law = instrument.convergence.law();
     let goal = GOALS.into_iter().find(|&goal| goal < noise * 0.95);
@@ -149,7 +173,6 @@ pub fn note_noise(
 mod tests {
     use super::*;
     use crate::trace::convergence::next_look;
-    use glam::UVec2;
 
     fn world() -> World {
         let mut world = World::new();
@@ -157,6 +180,7 @@ mod tests {
         world.init_resource::<FrameStats>();
         world.init_resource::<Redone>();
         world.init_resource::<Viewpoint>();
+        world.init_resource::<Notices>();
         let settings = RenderSettings { size: UVec2::ONE, ..RenderSettings::default() };
         world.insert_resource(settings);
         world.insert_resource(Film::new(UVec2::ONE, 0));
@@ -215,18 +239,36 @@ mod tests {
     fn the_true_error_is_told_only_of_the_view_it_is_of() {
         let mut world = world();
         let image = LinearImage { size: UVec2::ONE, pixels: vec![glam::Vec3::splat(2.0)] };
-        world.resource_mut::<Instrument>().reference = Some(Reference::new(image));
+        world.resource_mut::<Instrument>().reference = Some(Reference::new(image, Viewpoint::default()));
         let mut film = Film::new(UVec2::ONE, 0);
         film.tiles_mut()[0].pixels_mut()[0].add(0, glam::Vec3::splat(2.2));
         world.insert_resource(film);
-        refine(&mut world, 2);
         let error = |world: &World| world.resource::<Instrument>().graph.current.last().unwrap().error;
+        // Whoever has flown away before the first estimate does not make that the view of the reference.
+        let moved = glam::DAffine3::from_translation(glam::DVec3::Y);
+        let projection = crate::scene::Camera::default().projection;
+        world.insert_resource(Viewpoint::new(&moved, projection));
+        refine(&mut world, 2);
+        assert_eq!(error(&world), None);
+        world.insert_resource(Viewpoint::default());
+        world.resource_mut::<Redone>().resets += 1;
+        refine(&mut world, 2);
         assert!((error(&world).unwrap() - 0.1 / 1.01f64.sqrt()).abs() < 1e-6);
         let moved = glam::DAffine3::from_translation(glam::DVec3::X);
-        let projection = crate::scene::Camera::default().projection;
         world.insert_resource(Viewpoint::new(&moved, projection));
         world.resource_mut::<Redone>().resets += 1;
         refine(&mut world, 2);
         assert_eq!(error(&world), None);
+    }
+    #[test]
+    fn a_reference_of_another_size_is_told_once() {
+        let mut world = world();
+        let image = LinearImage { size: UVec2::new(2, 1), pixels: vec![glam::Vec3::ONE; 2] };
+        world.resource_mut::<Instrument>().reference = Some(Reference::new(image, Viewpoint::default()));
+        refine(&mut world, 16);
+        let said = &world.resource::<Notices>().0;
+        assert_eq!(said.len(), 1, "{said:?}");
+        let Notice::Text(text) = &said[0] else { panic!("{said:?}") };
+        assert!(text.contains("2 × 1") && text.contains("1 × 1"), "{text}");
     }
 }

@@ -112,15 +112,18 @@ impl Viewer {
             Tap::Help => self.ui.help = !self.ui.help,
             Tap::Report => self.ui.report = !self.ui.report,
             Tap::Open => self.ui.prompt = Some(Prompt::new("")),
-            Tap::Escape if self.ui.help => self.ui.help = false,
-            Tap::Escape if self.ui.report => self.ui.report = false,
+            Tap::Escape => self.escape(),
+            Tap::Split => {
+                self.split = self.cursor_in_picture().x;
+                return self.pass_on(tap);
+            }
             Tap::Quit => event_loop.exit(),
             // What is looked at closely is the film alone: the engine is asked for it.
-            Tap::Keep | Tap::Screenshot | Tap::ScreenshotWithHud if self.is_altered() => {
-                let press = Press { tap, shift: false, cursor: self.cursor_in_picture() };
-                return self.send(Command::Tap { press, at: Instant::now() });
+            Tap::Screenshot | Tap::ScreenshotWithHud
+                if self.is_altered() && (tap == Tap::Screenshot || self.other().is_none()) =>
+            {
+                return self.pass_on(tap);
             }
-            Tap::Keep => self.keep_picture(self.picture.clone()),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {
                     screen.toggle_full_screen();
@@ -129,13 +132,35 @@ impl Viewer {
             Tap::Screenshot | Tap::ScreenshotWithHud => {
                 self.save_screenshot(tap == Tap::ScreenshotWithHud, None);
             }
-            tap => {
-                let shift = self.held[Hold::Fast as usize];
-                let press = Press { tap, shift, cursor: self.cursor_in_picture() };
-                return self.send(Command::Tap { press, at: Instant::now() });
-            }
+            tap => return self.pass_on(tap),
         }
         self.redraw();
+    }
+
+    /// Tells the engine.
+    fn pass_on(&self, tap: Tap) {
+        let shift = self.held[Hold::Fast as usize];
+        let press = Press { tap, shift, cursor: self.cursor_in_picture() };
+        self.send(Command::Tap { press, at: Instant::now() });
+    }
+
+    /// Lets the mouse go, or closes what lies on top; with nothing open it says what ends the program.
+    fn escape(&mut self) {
+        let edits = self.status.as_ref().is_some_and(|status| status.edit.is_some());
+        let explains = self.status.as_ref().is_some_and(|status| status.debug.is_open());
+        if self.drag.is_some() {
+            self.end_drag();
+        } else if self.ui.help {
+            self.ui.help = false;
+        } else if self.ui.report {
+            self.ui.report = false;
+        } else if self.ui.graph && !edits {
+            self.ui.graph = false;
+        } else if edits || explains || self.compared.split {
+            self.pass_on(Tap::Escape);
+        } else if let Some(quit) = self.options.keys.label(Tap::Quit, &self.letters) {
+            self.say(format!("{quit} quits"));
+        }
     }
 
     pub(super) fn leave(&mut self) {

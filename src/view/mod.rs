@@ -31,6 +31,7 @@ pub mod reload;
 pub mod replay;
 pub mod screen;
 pub mod screenshot;
+pub mod sides;
 pub mod status;
 pub mod ui;
 pub mod watch;

@@ -13,7 +13,7 @@ use crate::scene::SceneBounds;
 use crate::scene::color::{luminance, srgb_from_linear};
 use crate::sync::{Redone, Traceable};
 use crate::trace::first::{Cost, FirstSurface, Grid, costs, first_surfaces};
-use crate::trace::{Film, noise};
+use crate::trace::{Film, Viewpoint, noise};
 use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec3};
 use std::sync::atomic::Ordering;
@@ -104,8 +104,6 @@ pub fn choose_pixel_view(
     input: Res<Input>,
     instrument: Res<Instrument>,
     mut view: ResMut<PixelView>,
-    mut budget: ResMut<FrameBudget>,
-    mut display: ResMut<Display>,
     mut notices: ResMut<Notices>,
 ) {
     let mut wanted = *view;
@@ -117,8 +115,23 @@ pub fn choose_pixel_view(
         }
         notices.0.push(Notice::Text(format!("view: {}", wanted.title())));
     }
-    if view.set_if_neq(wanted) {
-        budget.develop = wanted == PixelView::Beauty;
+    view.set_if_neq(wanted);
+}
+
+/// Light is developed if it is wanted, or if nobody knows the error of what is seen.
+pub fn choose_developed(
+    view: Res<PixelView>,
+    instrument: Res<Instrument>,
+    viewpoint: Res<Viewpoint>,
+    film: Res<Film>,
+    mut budget: ResMut<FrameBudget>,
+    mut display: ResMut<Display>,
+) {
+    let is_known =
+        instrument.reference.as_ref().is_some_and(|reference| reference.is_of(&viewpoint, film.size()));
+    let develop = *view == PixelView::Beauty || *view == PixelView::Error && !is_known;
+    if budget.develop != develop {
+        budget.develop = develop;
         // The picture is to be developed again.
         display.set_changed();
     }
@@ -164,7 +177,7 @@ pub struct DepthWanted(pub bool);
 
 /// Makes the picture of anything but light.
 pub fn develop_pixel_view(
-    view: Res<PixelView>,
+    (view, budget): (Res<PixelView>, Res<FrameBudget>),
     film: Res<Film>,
     first: Res<FirstHits>,
     bounds: Option<Res<SceneBounds>>,
@@ -172,8 +185,9 @@ pub fn develop_pixel_view(
     mut legend: ResMut<CurrentLegend>,
     mut picture: ResMut<Picture>,
 ) {
-    if *view == PixelView::Beauty {
-        legend.set_if_neq(CurrentLegend(None));
+    if budget.develop {
+        let unknown = Legend { title: "no reference of this view: the picture", range: None };
+        legend.set_if_neq(CurrentLegend((*view == PixelView::Error).then_some(unknown)));
         return;
     }
     if !(view.is_changed() || film.is_changed() || first.is_changed()) {
@@ -301,48 +315,4 @@ fn not_finite(film: &Film) -> Vec<[u8; 3]> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_key_goes_round_all_views_both_ways() {
-        let mut view = PixelView::Beauty;
-        let mut seen = Vec::new();
-        for _ in ALL {
-            view = view.stepped(1);
-            assert!(!seen.contains(&view));
-            seen.push(view);
-        }
-        assert_eq!(view, PixelView::Beauty);
-        assert_eq!(view.stepped(-1), PixelView::NotFinite);
-    }
-
-    #[test]
-    fn a_pixel_whose_sample_was_dropped_is_red_and_no_other() {
-        let mut film = Film::new(UVec2::new(20, 12), 0);
-        for tile in film.tiles_mut() {
-            let (width, origin) = (tile.size.x, tile.origin);
-            for (i, pixel) in tile.pixels_mut().iter_mut().enumerate() {
-                let place = origin + UVec2::new(i as u32 % width, i as u32 / width);
-                let light = if place == UVec2::new(13, 9) { f32::NAN } else { 0.5 };
-                pixel.add(0, Vec3::splat(light));
-            }
-            tile.next_sample = 1;
-        }
-        let colors = not_finite(&film);
-        let red: Vec<usize> = (0..colors.len()).filter(|&i| colors[i][0] == 255).collect();
-        assert_eq!(red, [9 * 20 + 13]);
-    }
-
-    #[test]
-    fn more_is_lighter_and_depth_is_darker() {
-        let (colors, range) = linear(&[0.0, 10.0, 20.0]);
-        let light = |c: &[u8; 3]| c.iter().map(|&c| u32::from(c)).sum::<u32>();
-        assert!(light(&colors[0]) < light(&colors[1]) && light(&colors[1]) < light(&colors[2]));
-        assert_eq!(range.unwrap(), ["0", "20"]);
-        let (colors, _) = near_bright(&[1.0, 5.0, f32::INFINITY], 1.0);
-        assert_eq!(colors, [[255; 3], [35; 3], [0; 3]]);
-        near_bright(&[f32::INFINITY; 3], 1.0);
-        assert_eq!(linear(&[]).0.len(), 0);
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use super::input::Input;
 use super::keymap::Tap;
-use super::pixel_view::PixelView;
+use crate::app::FrameBudget;
 use crate::image::develop::develop;
 use crate::image::{Display, Picture};
 use crate::preview::Preview;
@@ -16,7 +16,7 @@ pub struct Plain(pub Vec<(Tap, Picture)>);
 /// Develops what was asked for.
 pub fn develop_plain(
     input: Res<Input>,
-    view: Res<PixelView>,
+    budget: Res<FrameBudget>,
     film: Res<Film>,
     preview: Res<Preview>,
     display: Res<Display>,
@@ -24,10 +24,10 @@ pub fn develop_plain(
     mut plain: ResMut<Plain>,
 ) {
     for press in &input.taps {
-        if !matches!(press.tap, Tap::Keep | Tap::Screenshot | Tap::ScreenshotWithHud) {
+        if !matches!(press.tap, Tap::Screenshot | Tap::ScreenshotWithHud) {
             continue;
         }
-        let made = if *view == PixelView::Beauty {
+        let made = if budget.develop {
             let rgba = develop(&film, preview.film(), &display);
             Picture { size: film.size(), rgba, version: picture.version }
         } else {

@@ -21,7 +21,11 @@ impl Viewer {
     /// A button went down or up.
     pub(super) fn button(&mut self, button: MouseButton, down: bool) {
         if self.ui.button(button, down) {
-            return self.redraw();
+            self.redraw();
+            // What began beside the cards ends wherever the button is let go.
+            if down || self.drag.is_none() {
+                return;
+            }
         }
         let drag = match button {
             MouseButton::Right => Drag::Look,
@@ -93,6 +97,12 @@ impl Viewer {
             self.screen.as_ref().map_or((1.0, glam::UVec2::ONE), |s| (s.window.scale_factor(), s.size()));
         if self.ui.pointer(DVec2::new(to.x, to.y), display) {
             self.redraw();
+        }
+        if let (None, Some(screen)) = (self.drag, &self.screen) {
+            self.split = (to.x / f64::from(screen.size().x)).clamp(0.0, 1.0);
+            if self.compared.split {
+                self.redraw();
+            }
         }
         let (Some((drag, start)), Some(screen)) = (self.drag, &self.screen) else {
             return;

@@ -8,6 +8,7 @@ use super::controls::{
 };
 use super::crop::change_region;
 use super::debug::{CurrentLayer, Debug, DebugLines, change_debug, draw_layer, explain_pinned};
+use super::edit::marks::{Marks, mark};
 use super::edit::{Editor, edit_scene, finish_sync, start_sync};
 use super::engine::Pending;
 use super::fly::{FlySpeed, change_speed, fly_camera, look_around, take_off};
@@ -15,12 +16,13 @@ use super::input::Input;
 use super::instrument::{Instrument, note_noise};
 use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
 use super::pixel_view::{
-    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_pixel_view, develop_pixel_view,
-    refine_first_hits,
+    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_developed, choose_pixel_view,
+    develop_pixel_view, refine_first_hits,
 };
 use super::plain::{Plain, develop_plain};
 use super::playing::{Clock, advance};
 use super::recipe::recipe;
+use super::sides::{Compared, Sides, change_sides, develop_side};
 use super::status::{Machine, Status};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
 use crate::image::Display;
@@ -62,6 +64,8 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Clock>();
     app.world.init_resource::<Notices>();
     app.world.init_resource::<Plain>();
+    app.world.init_resource::<Sides>();
+    app.world.init_resource::<Compared>();
     app.world.init_resource::<Held>();
     app.world.init_resource::<Bookmarks>();
     app.world.init_resource::<Pending>();
@@ -71,6 +75,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<FirstHits>();
     app.world.init_resource::<Debug>();
     app.world.init_resource::<Editor>();
+    app.world.init_resource::<Marks>();
     app.world.init_resource::<DebugLines>();
     app.world.init_resource::<CurrentLayer>();
     let pivot = app.world.get_resource::<SceneBounds>().map_or(DVec3::ZERO, |bounds| bounds.center);
@@ -86,7 +91,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
         (
             change_region,
             change_settings,
-            (change_shown, develop_plain).chain(),
+            (change_sides, change_shown, develop_plain).chain(),
             save_picture,
             change_display,
             (change_pause, advance).chain(),
@@ -99,10 +104,13 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     );
     app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
     app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
-    app.add_systems(finish_sync.in_set(FrameSystems::Sync).after(reset_film));
+    app.add_systems((finish_sync, mark).chain().in_set(FrameSystems::Sync).after(reset_film));
+    app.add_systems(choose_developed.in_set(FrameSystems::Sync).after(reset_film));
     app.add_systems(count_held.in_set(FrameSystems::Trace));
     app.add_systems(explain_pinned.in_set(FrameSystems::Sync).after(reset_film));
-    app.add_systems((note_noise, develop_pixel_view, draw_layer).chain().in_set(FrameSystems::Present));
+    app.add_systems(
+        (note_noise, develop_pixel_view, develop_side, draw_layer).chain().in_set(FrameSystems::Present),
+    );
 }
 
 /// What the window is to show of `app` beside the picture.
@@ -113,7 +121,6 @@ pub fn status(app: &App) -> Status {
     let settings = world.resource::<RenderSettings>();
     let display = world.resource::<Display>();
     let shown = world.resource::<Shown>();
-    let shows_light = *world.resource::<PixelView>() == PixelView::Beauty;
     Status {
         samples_per_pixel: stats.samples_per_pixel,
         sample_target: world.resource::<FrameBudget>().sample_target,
@@ -129,7 +136,7 @@ pub fn status(app: &App) -> Status {
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         kept: shown.kept_share(world.resource::<Film>().complete_samples(), stats.done),
-        smoothed: shown.is_smoothed() && shows_light,
+        smoothed: shown.is_smoothed() && world.resource::<FrameBudget>().develop,
         region: world.resource::<FrameBudget>().region.map(|[min, max]| {
             let size = max - min;
             [min.x, min.y, size.x, size.y]

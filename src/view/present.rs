@@ -7,11 +7,13 @@ use super::input::Command;
 use super::keymap::{Hold, Tap};
 use super::screen::{Presented, Screen};
 use super::screenshot;
+use super::sides::{self, Side};
 use super::status::{Level, Measured, Status};
 use super::ui::Content;
 use super::window::Viewer;
 use crate::image::Picture;
 use glam::UVec2;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
@@ -33,6 +35,7 @@ impl Viewer {
         }
         self.moving = published.moving;
         self.layer.clone_from(&published.layer);
+        self.compared.clone_from(&published.compared);
         self.status.clone_from(&published.status);
         self.loading.clone_from(&published.loading);
     }
@@ -66,6 +69,7 @@ impl Viewer {
         }
         let screen_size = self.screen.as_ref().map_or(UVec2::ONE, Screen::size);
         let drawn = self.drawn_region();
+        let other = self.other();
         let Some(screen) = &mut self.screen else {
             return;
         };
@@ -75,6 +79,7 @@ impl Viewer {
             measured,
             loading: self.loading.as_deref(),
             notice: &self.notice,
+            compared: other.as_ref().map(|(side, part)| (side.name, *part)),
             keys: &self.options.keys,
             letters: &self.letters,
         };
@@ -83,9 +88,7 @@ impl Viewer {
             let [left, top, width, height] = self.status.as_ref().filter(|s| s.size == screen_size)?.region?;
             Some([UVec2::new(left, top), UVec2::new(left + width, top + height)])
         });
-        let compare = self.held[Hold::Compare as usize];
-        let picture = self.kept.as_ref().filter(|_| compare).unwrap_or(&self.picture);
-        let (ui, layer) = (&mut self.ui, self.layer.as_ref().filter(|_| !compare));
+        let (picture, ui, layer) = (&self.picture, &mut self.ui, &self.layer);
         let outcome = screen.draw(|bytes, size| {
             if picture.rgba.is_empty() {
                 bytes.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&[24, 24, 28, 255]));
@@ -95,6 +98,9 @@ impl Viewer {
             // After a resize the old layer would lie beside what it is about.
             if let Some(layer) = layer.as_ref().filter(|layer| layer.size == size && picture.size == size) {
                 layer.cover(bytes);
+            }
+            if let Some((side, part)) = &other {
+                sides::cover(bytes, size, &side.picture, *part);
             }
             if let Some(region) = region.filter(|_| ui.level != Level::None) {
                 crop::outline(bytes, size, region);
@@ -186,10 +192,13 @@ impl Viewer {
         Measured { pictures_per_second, latency }
     }
 
-    /// Remembers what is seen now.
-    pub(super) fn keep_picture(&mut self, picture: Picture) {
-        self.kept = Some(picture);
-        self.say("kept: hold K to see it".to_owned());
+    /// What is shown over the picture to compare it with, and up to which part of its width.
+    pub(super) fn other(&self) -> Option<(Arc<Side>, f64)> {
+        let side = self.compared.side.clone()?;
+        if self.held[Hold::Compare as usize] {
+            return Some((side, 1.0));
+        }
+        self.compared.split.then_some((side, self.split))
     }
 
     /// Whether the picture shows more than the film.
@@ -198,12 +207,8 @@ impl Viewer {
     }
 
     /// The engine has made the picture of the film alone that `tap` needs.
-    pub(super) fn take_plain(&mut self, tap: Tap, picture: Picture) {
-        if tap == Tap::Keep {
-            self.keep_picture(picture);
-        } else {
-            self.save_screenshot(tap == Tap::ScreenshotWithHud, Some(&picture));
-        }
+    pub(super) fn take_plain(&mut self, tap: Tap, picture: &Picture) {
+        self.save_screenshot(tap == Tap::ScreenshotWithHud, Some(picture));
     }
 
     /// Writes what the window shows, or `plain` in place of its picture, to a file, on a thread of its own.
@@ -221,6 +226,7 @@ impl Viewer {
                     measured: self.measured(),
                     loading: None,
                     notice: "",
+                    compared: None,
                     keys: &self.options.keys,
                     letters: &self.letters,
                 };
@@ -241,10 +247,13 @@ impl Viewer {
             bytes
         };
         let stem = self.options.screenshot_stem.clone();
-        let recipe = self.status.as_ref().map_or_else(Default::default, |status| status.recipe.clone());
+        // Another picture, or parts of two, cannot be made again from what makes this one.
+        let is_other = with_hud && plain.is_none() && self.other().is_some();
+        let recipe = self.status.as_ref().filter(|_| !is_other).map(|status| status.recipe.clone());
         let proxy = self.proxy.clone();
         let writer = std::thread::spawn(move || {
-            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe) {
+            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe.unwrap_or_default())
+            {
                 Ok(path) => format!("saved {}", path.display()),
                 Err(why) => format!("no screenshot: {why}"),
             };

@@ -170,17 +170,25 @@ pub fn caution(status: &Status) -> Option<String> {
     if let Some(scale) = status.preview_scale.filter(|&scale| scale > 1) {
         said.push(format!("preview 1/{scale}"));
     }
-    if status.kept > 0.0 {
-        said.push(format!("kept {:.0} %", status.kept * 100.0));
-    }
-    if status.smoothed {
-        said.push("smoothed".to_owned());
-    }
+    said.extend(altered(status));
     if let Some([left, top, width, height]) = status.region {
         said.push(format!("only {width} × {height} at {left}, {top}"));
     }
     if status.dropped > 0 {
         said.push(format!("{} samples dropped: not finite", status.dropped));
+    }
+    (!said.is_empty()).then(|| said.join("  "))
+}
+
+/// What is told even where nothing else is: that more is shown than the film.
+#[must_use]
+pub fn altered(status: &Status) -> Option<String> {
+    let mut said = Vec::new();
+    if status.kept > 0.0 {
+        said.push(format!("kept {:.0} %", status.kept * 100.0));
+    }
+    if status.smoothed {
+        said.push("smoothed".to_owned());
     }
     (!said.is_empty()).then(|| said.join("  "))
 }

@@ -7,6 +7,7 @@ use super::input::{Command, Drag};
 use super::keymap::Hold;
 use super::keys::Down;
 use super::screen::{Screen, vector};
+use super::sides::Compared;
 use super::status::Status;
 use super::ui::Ui;
 use super::{Response, ViewError, ViewOptions};
@@ -58,8 +59,9 @@ pub struct Viewer {
     pub(super) letters: Letters,
     pub(super) visible: bool,
     pub(super) picture: Picture,
-    /// To compare with.
-    pub(super) kept: Option<Picture>,
+    pub(super) compared: Compared,
+    /// Where the other picture ends if both are shown, in parts of the width.
+    pub(super) split: f64,
     pub(super) layer: Option<Arc<Layer>>,
     pub(super) status: Option<Status>,
     /// What is loading, and how far it is.
@@ -133,7 +135,8 @@ impl Viewer {
             letters: Letters::default(),
             visible: true,
             picture: Picture::default(),
-            kept: None,
+            compared: Compared::default(),
+            split: 0.5,
             layer: None,
             status: None,
             loading: None,
@@ -295,8 +298,7 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.options.screenshot_stem = name;
                 self.redraw();
             }
-            Wake::Plain(tap, picture) => self.take_plain(tap, picture),
-            Wake::Reference(picture) => self.kept = Some(picture),
+            Wake::Plain(tap, picture) => self.take_plain(tap, &picture),
             Wake::OpenFailed(why) => self.fail(event_loop, ViewError::Scene(why)),
             Wake::Crashed(why) => self.fail(event_loop, ViewError::Lost(format!("internal error: {why}"))),
         }

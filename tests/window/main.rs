@@ -7,6 +7,7 @@
 
 #[path = "../support/desktop.rs"]
 mod desktop;
+mod editing;
 mod files;
 mod flying;
 mod pictures;

@@ -41,7 +41,7 @@ const MOST: usize = 4000;
 
 /// A box where it stands.
 #[derive(Clone, Copy)]
-pub(super) struct Placed<'a> {
+pub(in crate::view) struct Placed<'a> {
     pub bounds: Aabb,
     /// `None`: in render space itself.
     pub placement: Option<&'a Placement>,
@@ -49,7 +49,7 @@ pub(super) struct Placed<'a> {
 
 impl Placed<'_> {
     /// Its twelve edges.
-    pub(super) fn lines(&self, color: [u8; 3], alpha: f32) -> impl Iterator<Item = Line> {
+    pub(in crate::view) fn lines(&self, color: [u8; 3], alpha: f32) -> impl Iterator<Item = Line> {
         let corner = |i: usize| {
             let pick = |axis: usize| if i >> axis & 1 == 0 { self.bounds.min } else { self.bounds.max }[axis];
             let local = Vec3::new(pick(0), pick(1), pick(2));

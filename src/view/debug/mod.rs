@@ -4,6 +4,8 @@ pub mod boxes;
 pub mod layer;
 
 use super::controls::{Notice, Notices};
+use super::edit::Editor;
+use super::edit::marks::Marks;
 use super::input::{Input, Press};
 use super::keymap::Tap;
 use super::pixel_view::{DepthWanted, FirstHits};
@@ -27,8 +29,8 @@ const SAMPLES: u32 = 32;
 pub struct Debug {
     /// Whether clicks pin pixels.
     pinning: bool,
-    /// The pixel that is explained, and from where it was looked at.
-    pinned: Option<(UVec2, Viewpoint)>,
+    /// The pixel that is explained.
+    pinned: Option<Pinned>,
     boxes: Boxes,
     /// Level to return to.
     level: u32,
@@ -37,6 +39,24 @@ pub struct Debug {
     step: usize,
     told: Option<Arc<Told>>,
     statistics: Option<Arc<Statistics>>,
+}
+
+/// A pixel of a picture, and from where that was seen.
+#[derive(Clone, Copy, Debug)]
+struct Pinned {
+    pixel: UVec2,
+    size: UVec2,
+    viewpoint: Viewpoint,
+}
+
+impl Pinned {
+    /// The pixel that shows the same in a picture of another size, if that reaches so far.
+    fn at(&self, size: UVec2) -> Option<UVec2> {
+        let (old, new) = (self.size.as_dvec2(), size.as_dvec2());
+        // Pictures of all sizes show as much from top to bottom, around the same middle.
+        let place = (self.pixel.as_dvec2() + 0.5 - old * 0.5) * (new.y / old.y) + new * 0.5;
+        (place.cmpge(DVec2::ZERO).all() && place.cmplt(new).all()).then(|| place.as_uvec2())
+    }
 }
 
 /// What is told about the pinned pixel.
@@ -67,6 +87,14 @@ pub struct DebugStatus {
     pub statistics: Option<Arc<Statistics>>,
 }
 
+impl DebugStatus {
+    /// Whether rays or boxes are shown.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.told.is_some() || self.boxes != Boxes::Off
+    }
+}
+
 /// What is drawn over the picture, if anything.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct CurrentLayer(pub Option<Arc<Layer>>);
@@ -82,6 +110,12 @@ impl Debug {
             boxes: self.boxes,
             statistics: self.statistics.clone(),
         }
+    }
+
+    /// Whether rays or boxes are wanted.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.pinned.is_some() || self.boxes != Boxes::Off
     }
 
     fn press(
@@ -100,6 +134,7 @@ impl Debug {
                     return Some("click a pixel to see its rays");
                 }
             }
+            Tap::Escape => (self.pinning, self.pinned, self.step, self.boxes) = (false, None, 0, Boxes::Off),
             Tap::Click if self.pinning => self.pin(press.cursor, viewpoint, size),
             Tap::Boxes => {
                 self.boxes = match self.boxes {
@@ -132,8 +167,9 @@ impl Debug {
     }
 
     fn pin(&mut self, cursor: DVec2, viewpoint: &Viewpoint, size: UVec2) {
-        let pixel = (cursor * size.as_dvec2()).as_uvec2().min(size.max(UVec2::ONE) - 1);
-        self.pinned = Some((pixel, *viewpoint));
+        let size = size.max(UVec2::ONE);
+        let pixel = (cursor * size.as_dvec2()).as_uvec2().min(size - 1);
+        self.pinned = Some(Pinned { pixel, size, viewpoint: *viewpoint });
         self.step = 0;
     }
 }
@@ -143,6 +179,7 @@ pub fn change_debug(
     input: Res<Input>,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
+    editor: Res<Editor>,
     mut debug: ResMut<Debug>,
     mut depth_wanted: ResMut<DepthWanted>,
     mut notices: ResMut<Notices>,
@@ -151,7 +188,9 @@ pub fn change_debug(
         let stepping = matches!(press.tap, Tap::NextStep | Tap::PreviousStep | Tap::Order);
         stepping || matches!(press.tap, Tap::Pin | Tap::Click | Tap::Boxes | Tap::LevelUp | Tap::LevelDown)
     };
-    for press in input.taps.iter().filter(ours) {
+    // One thing at a time is closed.
+    let closes = debug.is_open() && !editor.has_selection();
+    for press in input.taps.iter().filter(|press| ours(press) || press.tap == Tap::Escape && closes) {
         let levels = debug.statistics.as_ref().map_or(u32::MAX, |statistics| statistics.levels);
         if let Some(text) = debug.press(press, &viewpoint, settings.size, levels) {
             notices.0.push(Notice::Text(text.to_owned()));
@@ -182,14 +221,14 @@ pub fn explain_pinned(
         drawn.extend(boxes);
         debug.statistics = Some(Arc::new(statistics));
     }
-    debug.told =
-        debug.pinned.filter(|(pixel, _)| pixel.cmplt(seen.settings.size).all()).map(|(pixel, viewpoint)| {
-            let scene = TraceScene { viewpoint: &viewpoint, ..seen };
-            let far = bounds.map_or(10.0, |bounds| 2.0 * bounds.radius as f32);
-            let first = film.first_sample();
-            let explanation = explain(&scene, pixel, first..first.saturating_add(SAMPLES), far);
-            Arc::new(tell(&seen.geometry.tlas, explanation))
-        });
+    let pinned = debug.pinned.and_then(|pinned| Some((pinned.at(seen.settings.size)?, pinned.viewpoint)));
+    debug.told = pinned.map(|(pixel, viewpoint)| {
+        let scene = TraceScene { viewpoint: &viewpoint, ..seen };
+        let far = bounds.map_or(10.0, |bounds| 2.0 * bounds.radius as f32);
+        let first = film.first_sample();
+        let explanation = explain(&scene, pixel, first..first.saturating_add(SAMPLES), far);
+        Arc::new(tell(&seen.geometry.tlas, explanation))
+    });
     if let Some(told) = &debug.told {
         drawn.extend(ray_lines(&told.explanation));
         let steps = &told.steps[debug.order as usize];
@@ -255,7 +294,7 @@ fn step_lines(tlas: &Tlas, steps: &[Step]) -> Vec<Line> {
 
 /// Draws the lines as the camera sees them now.
 pub fn draw_layer(
-    lines: Res<DebugLines>,
+    (lines, marks): (Res<DebugLines>, Res<Marks>),
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
     first: Res<FirstHits>,
@@ -263,12 +302,13 @@ pub fn draw_layer(
     mut drawn: Local<u64>,
     mut layer: ResMut<CurrentLayer>,
 ) {
-    let is_new = lines.is_changed() || first.is_changed() || *drawn != redone.resets;
-    if !is_new || lines.0.is_empty() && layer.0.is_none() {
+    let is_new = lines.is_changed() || marks.is_changed() || first.is_changed() || *drawn != redone.resets;
+    let is_empty = lines.0.is_empty() && marks.is_empty();
+    if !is_new || is_empty && layer.0.is_none() {
         return;
     }
     *drawn = redone.resets;
-    if lines.0.is_empty() {
+    if is_empty {
         layer.0 = None;
         return;
     }
@@ -276,5 +316,30 @@ pub fn draw_layer(
     let surfaces = first.surfaces.as_ref().filter(|grid| grid.size() == size && grid.is_covered());
     let mut made = Layer::new(size);
     made.draw(&lines.0, &viewpoint, surfaces.map(crate::trace::first::Grid::cells));
+    made.draw(&marks.lines(&viewpoint, size), &viewpoint, None);
     layer.0 = Some(Arc::new(made));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pinned_pixel_is_the_same_place_after_a_resize() {
+        let viewpoint = Viewpoint::default();
+        let sizes = [UVec2::new(320, 240), UVec2::new(640, 480), UVec2::new(300, 480), UVec2::new(777, 131)];
+        for pixel in [UVec2::new(160, 120), UVec2::new(130, 31), UVec2::new(201, 239)] {
+            let pinned = Pinned { pixel, size: sizes[0], viewpoint };
+            let direction = |pixel: UVec2, size: UVec2| viewpoint.ray(pixel.as_vec2() + 0.5, size).direction;
+            let wanted = direction(pixel, sizes[0]);
+            assert_eq!(pinned.at(sizes[0]), Some(pixel));
+            for size in sizes {
+                let off = direction(pinned.at(size).unwrap(), size).distance(wanted);
+                // Within a pixel.
+                assert!(off < 1.2 / size.y as f32, "{pixel} {size} {off}");
+            }
+        }
+        let corner = Pinned { pixel: UVec2::ZERO, size: sizes[0], viewpoint };
+        assert_eq!(corner.at(UVec2::new(100, 240)), None, "beside the picture");
+    }
 }

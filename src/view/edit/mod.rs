@@ -1,6 +1,8 @@
 //! Changing the scene while it is seen: pick a thing, change its numbers, take it back, keep it in a file.
 
 pub mod carry;
+mod choice;
+pub mod marks;
 pub mod property;
 pub mod save;
 mod undo;
@@ -8,15 +10,13 @@ mod undo;
 use super::controls::{Notice, Notices};
 use super::input::Input;
 use super::keymap::Tap;
-use super::orbit::ray_through;
 use crate::app::FrameStats;
-use crate::bvh::Ray;
 use crate::load::settings::edit::{EditTable, duplicate};
 use crate::scene::path::path_of;
 use crate::scene::{Hidden, Playing, SceneBounds};
-use crate::sync::{Entities, Redone};
-use crate::trace::{Geometry, Lights, RenderSettings, Viewpoint};
+use crate::sync::Redone;
 use bevy_ecs::prelude::*;
+use choice::{kind_of, pick, stepped, things};
 use glam::DVec2;
 use property::{Property, Row, rows, set};
 use std::sync::Arc;
@@ -60,6 +60,10 @@ struct Selection {
 pub struct EditStatus {
     /// Its name.
     pub name: String,
+    /// What kind of light it is; or which of its materials is meant, if it has several.
+    pub kind: Option<String>,
+    /// The how manieth of how many things it is, in the order of the keys.
+    pub place: [usize; 2],
     /// Its numbers.
     pub rows: Vec<Row>,
     /// Which one the keys change.
@@ -75,6 +79,12 @@ impl Editor {
     #[must_use]
     pub fn status(&self) -> Option<Arc<EditStatus>> {
         self.shown.clone()
+    }
+
+    /// Whether there is something that the keys change.
+    #[must_use]
+    pub fn has_selection(&self) -> bool {
+        self.selected.is_some()
     }
 
     /// Whether anything was edited.
@@ -111,6 +121,8 @@ pub fn edit_scene(world: &mut World) {
         let steps = if press.shift { 10.0 } else { 1.0 };
         match press.tap {
             Tap::Select => select(world, &mut editor, press.cursor),
+            Tap::PreviousThing => go(world, &mut editor, -steps as i64),
+            Tap::NextThing => go(world, &mut editor, steps as i64),
             Tap::Escape => editor.selected = None,
             Tap::PreviousRow => editor.row = editor.row.saturating_sub(1),
             Tap::NextRow => editor.row += 1,
@@ -142,27 +154,20 @@ fn say(world: &mut World, text: &str) {
 }
 
 fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
-    let found = pick(world, cursor);
+    let found = pick(world, cursor, editor.selected.is_some());
     editor.row = 0;
     editor.selected = if editor.selected == found { None } else { found };
     if found.is_none() {
-        say(world, "nothing there to edit");
+        say(world, "nothing there to edit: Ctrl+PageDown goes through all there is");
     }
 }
 
-fn pick(world: &World, cursor: DVec2) -> Option<Selection> {
-    let geometry = world.resource::<Geometry>();
-    let ray = ray_through(world.resource::<Viewpoint>(), world.resource::<RenderSettings>(), cursor);
-    let hit = geometry.tlas.closest_hit(&ray);
-    let entities = world.resource::<Entities>();
-    let t_max = hit.map_or(f32::INFINITY, |hit| hit.t);
-    if let Some(lamp) = world.resource::<Lights>().closest(&Ray { t_max, ..ray }) {
-        let entity = *entities.lights.get(lamp.light as usize)?;
-        return Some(Selection { entity, slot: 0 });
+fn go(world: &mut World, editor: &mut Editor, by: i64) {
+    editor.row = 0;
+    editor.selected = stepped(&things(world), editor.selected, by);
+    if editor.selected.is_none() {
+        say(world, "there is nothing to edit");
     }
-    let hit = hit?;
-    let slot = geometry.instances[hit.instance as usize].mesh.slot(hit.triangle as usize);
-    Some(Selection { entity: *entities.instances.get(hit.instance as usize)?, slot })
 }
 
 fn change(world: &mut World, editor: &mut Editor, property: Property, value: f64) {
@@ -174,7 +179,7 @@ fn change(world: &mut World, editor: &mut Editor, property: Property, value: f64
 
 fn step(world: &mut World, editor: &mut Editor, steps: f64) {
     let Some(Selection { entity, slot }) = editor.selected else {
-        return say(world, "select something first: M");
+        return say(world, "select something first: M, or Ctrl+PageDown");
     };
     let rows = rows(world, entity, slot, radius(world));
     if let Some(row) = rows.get(editor.row.min(rows.len().saturating_sub(1))) {
@@ -246,11 +251,16 @@ fn show(world: &World, editor: &mut Editor) {
     if now != editor.before {
         editor.redone = told(editor.before, now, editor.sync, editor.lost);
     }
-    editor.shown = editor.selected.map(|Selection { entity, slot }| {
+    editor.shown = editor.selected.map(|selection| {
+        let Selection { entity, slot } = selection;
         let rows = rows(world, entity, slot, radius(world));
         editor.row = editor.row.min(rows.len().saturating_sub(1));
+        let things = things(world);
+        let here = things.iter().position(|&thing| thing == selection);
         Arc::new(EditStatus {
             name: path_of(world, entity).join(" / "),
+            kind: kind_of(world, selection),
+            place: [here.map_or(0, |here| here + 1), things.len()],
             rows,
             row: editor.row,
             hidden: world.get::<Hidden>(entity).is_some(),

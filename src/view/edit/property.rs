@@ -35,6 +35,8 @@ pub enum Property {
     Mirror,
     /// Luminance that it emits.
     Emission,
+    /// A channel of what it emits, relative to the strongest.
+    EmissionColor(usize),
 }
 
 /// A property and its value.
@@ -70,7 +72,12 @@ impl Row {
     }
 }
 
-const AXES: [[&str; 3]; 3] = [["x", "y", "z"], ["turn x", "turn y", "turn z"], ["red", "green", "blue"]];
+const AXES: [[&str; 3]; 4] = [
+    ["x", "y", "z"],
+    ["turn x", "turn y", "turn z"],
+    ["red", "green", "blue"],
+    ["emits red", "emits green", "emits blue"],
+];
 const ANY: [f64; 2] = [-1e15, 1e15];
 const UNIT: [f64; 2] = [0.0, 1.0];
 const POSITIVE: [f64; 2] = [1e-9, 1e12];
@@ -132,6 +139,13 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         }
         add(Property::Mirror, "mirror", f64::from(material.mirror.max_element()), 0.05, false, UNIT);
         add(Property::Emission, "emits", f64::from(luminance(material.emission)), 0.2, true, [0.0, 1e12]);
+        let most = f64::from(material.emission.max_element());
+        if most > 0.0 {
+            for (channel, label) in AXES[3].into_iter().enumerate() {
+                let share = f64::from(material.emission[channel]) / most;
+                add(Property::EmissionColor(channel), label, share, 0.05, false, UNIT);
+            }
+        }
     }
     rows
 }
@@ -249,6 +263,9 @@ fn set_material(material: &mut Material, property: Property, value: f32) {
     match property {
         Property::BaseColor(channel) => material.base_color[channel] = value,
         Property::Mirror => material.mirror = scaled(material.mirror, material.mirror.max_element()),
+        Property::EmissionColor(channel) => {
+            material.emission[channel] = value * material.emission.max_element();
+        }
         Property::Emission => material.emission = scaled(material.emission, luminance(material.emission)),
         Property::Roughness | Property::Metallic => {
             if let Glossy::Ggx { metallic, roughness, .. } = &mut material.glossy {
@@ -270,79 +287,4 @@ fn set_material(material: &mut Material, property: Property, value: f32) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::Emission;
-
-    fn world() -> (World, Vec<Entity>) {
-        let mut world = World::new();
-        let phong = Glossy::BlinnPhong { specular: Vec3::splat(0.2), exponent: 30.0, texture: None };
-        let material = world.spawn(Material { glossy: phong, ..Material::default() }).id();
-        let ggx = Glossy::Ggx { metallic: 0.0, roughness: 0.5, texture: None };
-        let shiny = world.spawn(Material { glossy: ggx, ..Material::default() }).id();
-        let turned = DQuat::from_euler(EulerRot::ZYX, 0.3, 0.2, 0.1);
-        let parent =
-            world.spawn(Transform::from_parts(DVec3::new(1.0, 2.0, 3.0), turned, DVec3::splat(2.0))).id();
-        let instance = |materials| Instance { mesh: parent, materials };
-        let one = Vec3::ONE;
-        let strength = [one, one * 2.0];
-        let lights = [
-            Light::Point { intensity: one },
-            Light::Spot { intensity: one, inner_angle: 0.1, outer_angle: 0.5 },
-            Light::Directional { irradiance: one, angle: 0.1 },
-            Light::Segment { half_length: 1.0, strength, emission: Emission::Sine },
-            Light::Parallelogram { edge_u: Vec3::X, edge_v: Vec3::Y, radiance: [one; 4], two_sided: false },
-            Light::Disk { radius: 1.0, radiance: one, two_sided: false },
-            Light::Sphere { radius: 1.0, radiance: one },
-            Light::Environment { radiance: one },
-        ];
-        let mut all = vec![
-            world.spawn((instance(vec![material]), ChildOf(parent))).id(),
-            world.spawn((instance(vec![shiny]), ChildOf(parent))).id(),
-        ];
-        all.extend(
-            lights.into_iter().map(|light| world.spawn((light, ChildOf(parent))).id()).collect::<Vec<_>>(),
-        );
-        crate::app::propagate(&mut world);
-        (world, all)
-    }
-
-    #[test]
-    fn what_is_set_is_what_it_is_then_and_nothing_else_changes() {
-        let (mut world, all) = world();
-        for entity in all {
-            for row in rows(&world, entity, 0, 1.0) {
-                let before = rows(&world, entity, 0, 1.0);
-                let up = row.stepped(1.0);
-                let wanted = if up == row.value { row.stepped(-1.0) } else { up };
-                assert_ne!(wanted, row.value, "{row:?}");
-                set(&mut world, entity, 0, row.property, wanted);
-                for (old, new) in before.iter().zip(rows(&world, entity, 0, 1.0)) {
-                    let coupled = matches!(
-                        (row.property, new.property),
-                        (Property::LightColor(_), Property::Power | Property::LightColor(_))
-                            | (Property::Power, Property::LightColor(_))
-                    );
-                    let expected = if old.property == row.property { wanted } else { old.value };
-                    let off = (new.value - expected).abs();
-                    assert!(
-                        coupled || off < 1e-5 * expected.abs().max(1.0),
-                        "{row:?}: {new:?}, not {expected}"
-                    );
-                }
-                set(&mut world, entity, 0, row.property, row.value);
-            }
-        }
-    }
-
-    #[test]
-    fn values_stay_where_they_mean_something() {
-        let (world, all) = world();
-        for row in all.iter().flat_map(|&entity| rows(&world, entity, 0, 1.0)) {
-            for steps in [-1e9, -1000.0, 1000.0] {
-                let value = row.stepped(steps);
-                assert!(value >= row.range[0] && value <= row.range[1], "{row:?} {value}");
-            }
-        }
-    }
-}
+mod tests;

@@ -6,7 +6,9 @@ use crate::app::{App, FrameBudget, FrameSystems};
 use crate::farm::Identity;
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{Wishes, open};
-use crate::trace::Film;
+use crate::scene::{GlobalTransform, Light};
+use crate::sync::RenderOrigin;
+use crate::trace::{Film, RenderSettings, Viewpoint};
 use glam::UVec2;
 use std::path::PathBuf;
 
@@ -67,7 +69,7 @@ fn a_saved_scene_is_the_edited_one_to_the_bit() {
         let mut app = editable(scene);
         let before = Identity::of(&app.world, scene.to_owned());
         for place in PLACES {
-            if pick(&app.world, place.into()).is_some() {
+            if pick(&app.world, place.into(), false).is_some() {
                 change_all(&mut app, place);
             }
         }
@@ -94,7 +96,7 @@ fn undo_brings_everything_back_to_the_bit() {
     let mut app = editable("cornell");
     let before = Identity::of(&app.world, String::new());
     for place in PLACES {
-        if pick(&app.world, place.into()).is_some() {
+        if pick(&app.world, place.into(), false).is_some() {
             change_all(&mut app, place);
         }
     }
@@ -141,4 +143,73 @@ fn only_what_must_be_is_redone_and_it_is_told() {
     let now = *app.world.resource::<Redone>();
     assert_eq!((now.blas, now.tlas), (before.blas, before.tlas + 1));
     assert!(status(&app).redone.starts_with("redone: top level, lights, in "), "{}", status(&app).redone);
+}
+
+/// Where the picture shows this place of the world.
+fn seen_at(app: &App, place: glam::DVec3) -> [f64; 2] {
+    let size = app.world.resource::<RenderSettings>().size;
+    let place = place - app.world.resource::<RenderOrigin>().0.unwrap_or_default();
+    let seen = app.world.resource::<Viewpoint>().project(place.as_vec3(), size).truncate().as_dvec2();
+    (seen / size.as_dvec2()).to_array()
+}
+
+#[test]
+fn a_lamp_that_no_ray_meets_is_picked_beside_its_place() {
+    let mut app = editable("cornell-point");
+    app.frame();
+    let mut lamps = app.world.query_filtered::<(Entity, &GlobalTransform), With<Light>>();
+    let (lamp, place) =
+        lamps.iter(&app.world).map(|(lamp, place)| (lamp, place.0.translation)).next().unwrap();
+    let [x, y] = seen_at(&app, place);
+    press(&mut app, Tap::Select, [x + 0.03, y]);
+    assert_eq!(app.world.resource::<Editor>().selected.map(|s| s.entity), Some(lamp));
+    let power = status(&app).rows.iter().find(|row| row.property == Property::Power).cloned();
+    assert!(power.is_some(), "{:?}", status(&app).rows);
+    choose(&mut app, [x + 0.3, y]);
+    assert_ne!(app.world.resource::<Editor>().selected.map(|s| s.entity), Some(lamp), "far beside it");
+}
+
+#[test]
+fn the_keys_go_through_all_things_also_those_that_are_hidden() {
+    let mut app = editable("cornell-point");
+    app.frame();
+    let count = things(&app.world).len();
+    let mut seen = Vec::new();
+    for i in 0..count {
+        press(&mut app, Tap::NextThing, [0.5; 2]);
+        assert_eq!(status(&app).place, [i + 1, count]);
+        let selected = app.world.resource::<Editor>().selected.unwrap();
+        assert!(!seen.contains(&selected));
+        press(&mut app, Tap::Hide, [0.5; 2]);
+        seen.push(selected);
+    }
+    assert!(app.world.get::<Light>(seen[0].entity).is_some(), "lights come first");
+    press(&mut app, Tap::NextThing, [0.5; 2]);
+    assert_eq!(app.world.resource::<Editor>().selected, Some(seen[0]), "round and round");
+    press(&mut app, Tap::PreviousThing, [0.5; 2]);
+    assert_eq!(app.world.resource::<Editor>().selected, seen.last().copied());
+    let last = seen[count - 1].entity;
+    assert!(status(&app).hidden && app.world.get::<Hidden>(last).is_some());
+    press(&mut app, Tap::Hide, [0.5; 2]);
+    assert!(!status(&app).hidden && app.world.get::<Hidden>(last).is_none());
+}
+
+#[test]
+fn while_something_is_selected_it_is_marked_and_so_are_lamps_that_are_not_seen() {
+    let mut app = editable("cornell-point");
+    app.world.init_resource::<marks::Marks>();
+    app.add_systems(marks::mark.in_set(FrameSystems::Sync).after(finish_sync));
+    app.frame();
+    let lines = |app: &App| {
+        let size = app.world.resource::<RenderSettings>().size;
+        app.world.resource::<marks::Marks>().lines(app.world.resource::<Viewpoint>(), size).len()
+    };
+    assert_eq!(lines(&app), 0);
+    press(&mut app, Tap::NextThing, [0.5; 2]);
+    let lamp = lines(&app);
+    assert!(lamp > 0);
+    press(&mut app, Tap::PreviousThing, [0.5; 2]);
+    assert_eq!(lines(&app), lamp + 12, "a box around the instance as well");
+    press(&mut app, Tap::Escape, [0.5; 2]);
+    assert_eq!(lines(&app), 0);
 }

@@ -3,13 +3,16 @@
 use super::super::cameras::{
     Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
 };
-use super::super::controls::Notices;
 use super::super::input::{Command, Press};
 use super::super::keymap::Side;
-use super::super::orbit::orbit_camera;
+use super::super::orbit::{focus, orbit_camera};
 use super::*;
+use crate::app::FrameSystems;
+use crate::load::{LoadOptions, SceneSource};
+use crate::open::{Wishes, open};
 use crate::scene::SceneBounds;
 use crate::trace::RenderSettings;
+use glam::UVec2;
 use std::time::{Duration, Instant};
 
 fn world() -> (World, Schedule) {
@@ -239,4 +242,38 @@ fn orbiting_keeps_the_distance_and_a_whole_turn_drifts_nowhere() {
     }
     let end = press(&mut world, &mut schedule, &[]).1;
     assert!(end.0.abs_diff_eq(start.0, 1e-9), "{start:?} {end:?}");
+}
+
+#[test]
+fn focusing_makes_the_file_s_own_lens_sharp_there_and_without_a_lens_nobody_takes_off() {
+    for lens in [None, Some(Lens { radius: 0.1, focus: 50.0 })] {
+        let source = SceneSource::parse("cornell").unwrap();
+        let wishes = Wishes { size: Some(UVec2::new(32, 24)), ..Wishes::default() };
+        let mut app = open(&source, &LoadOptions::default(), &wishes).unwrap().app;
+        let home = app.world.resource::<ActiveCamera>().0;
+        if let Some(lens) = lens {
+            app.world.entity_mut(home).insert(lens);
+        }
+        app.world.insert_resource(Navigation { orbiting: false, pivot: DVec3::ZERO, vertical_fov: 1.0 });
+        app.world.init_resource::<Notices>();
+        app.world.insert_resource(Input::new(Instant::now()));
+        app.add_systems((take_off, focus).chain().in_set(FrameSystems::Input));
+        app.frame();
+        app.world.resource_mut::<Input>().taps.push(Tap::Focus.into());
+        app.frame();
+        let active = app.world.resource::<ActiveCamera>().0;
+        let focus = app.world.get::<Lens>(active).map(|lens| lens.focus);
+        assert_eq!(active == home, lens.is_none());
+        assert_eq!(focus.is_some_and(|focus| focus != 50.0), lens.is_some(), "{focus:?}");
+        assert_eq!(app.world.get::<Lens>(home).copied(), lens, "the file's camera is left alone");
+    }
+}
+
+#[test]
+fn a_change_of_the_speed_is_told() {
+    let (mut world, mut schedule) = at_rest();
+    press(&mut world, &mut schedule, &[Tap::Faster, Tap::OpenLens]);
+    let notices = &world.resource::<Notices>().0;
+    assert_eq!(notices.first(), Some(&Notice::Text("speed: 3.00 / s".to_owned())));
+    assert_eq!(notices.len(), 2, "and silence where it stays: {notices:?}");
 }

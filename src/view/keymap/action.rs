@@ -121,6 +121,10 @@ pub enum Tap {
     Order,
     /// Edit what is under the cursor.
     Select,
+    /// Edit the thing before, in the order of all things.
+    PreviousThing,
+    /// Edit the next thing.
+    NextThing,
     /// The number above.
     PreviousRow,
     /// The number below.
@@ -169,6 +173,10 @@ pub enum Tap {
     Reload,
     /// Keep the picture to compare with.
     Keep,
+    /// Show the picture to compare with beside this one, or not.
+    Split,
+    /// Compare with the reference or with the kept picture.
+    OtherSide,
     /// Close what is open.
     Escape,
     /// End the program.

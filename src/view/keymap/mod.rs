@@ -94,6 +94,13 @@ impl Keymap {
         found(shift).or_else(|| found(false)).map(|(entry, _)| *entry)
     }
 
+    /// The first key of `tap`, as the user's keyboard names it, if it has one.
+    #[must_use]
+    pub fn label(&self, tap: Tap, letters: &Letters) -> Option<String> {
+        let (_, chords) = self.0.iter().find(|(entry, _)| entry.action == Action::Tap(tap))?;
+        chords.first().map(|chord| chord.label(letters))
+    }
+
     /// The keys of a row of the help, as the user's keyboard names them.
     #[must_use]
     pub fn keys_of(&self, row: &Row, letters: &Letters) -> String {

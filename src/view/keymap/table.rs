@@ -68,7 +68,10 @@ pub const TABLE: &[Section] = &[
     (
         "Views",
         &[
-            row("pivot and sharpness to the point under the cursor", &[tap("focus", Tap::Focus, &["F"])]),
+            row(
+                "pivot and sharpness to the point under the cursor (with a lens *)",
+                &[tap("focus", Tap::Focus, &["F"])],
+            ),
             row("whole scene *", &[tap("frame_all", Tap::FrameAll, &["Home"])]),
             row("first camera *", &[tap("reset_camera", Tap::ResetCamera, &["Enter", "NumpadEnter"])]),
             row(
@@ -128,7 +131,12 @@ pub const TABLE: &[Section] = &[
                 &[tap("pixel_view", Tap::PixelView, &["V"])],
             ),
             row("hold: the kept picture, or the reference", &[hold("compare", Hold::Compare, &["K"])]),
+            row("that one left of the cursor, this one right", &[tap("split", Tap::Split, &["Shift+K"])]),
             row("keep this picture to compare with", &[tap("keep", Tap::Keep, &["Ctrl+K"])]),
+            row(
+                "compare with the reference / the kept picture",
+                &[tap("other_side", Tap::OtherSide, &["Ctrl+Shift+K"])],
+            ),
             row("keep old samples while moving, or not", &[tap("keep_samples", Tap::KeepSamples, &["Y"])]),
             row("smooth the first second, or not", &[tap("smooth", Tap::Smooth, &["U"])]),
             row(
@@ -166,6 +174,13 @@ pub const TABLE: &[Section] = &[
         &[
             row("select what is under the cursor", &[tap("select", Tap::Select, &["M"])]),
             row(
+                "thing before, after; lights first (Shift: ten)",
+                &[
+                    again("previous_thing", Tap::PreviousThing, &["Ctrl+PageUp"]),
+                    again("next_thing", Tap::NextThing, &["Ctrl+PageDown", "Ctrl+M"]),
+                ],
+            ),
+            row(
                 "number above, below",
                 &[
                     again("previous_row", Tap::PreviousRow, &["Ctrl+ArrowUp"]),
@@ -202,8 +217,8 @@ pub const TABLE: &[Section] = &[
             ),
             row("save the picture as .exr and .png", &[tap("save", Tap::SavePicture, &["Ctrl+S"])]),
             row("open another scene (or drop it here)", &[tap("open", Tap::Open, &["Ctrl+O"])]),
-            row("load the scene again (it is when a file changes)", &[tap("reload", Tap::Reload, &["F5"])]),
-            row("close what is open", &[tap("escape", Tap::Escape, &["Escape"])]),
+            row("load the scene again (it is when a file changes) *", &[tap("reload", Tap::Reload, &["F5"])]),
+            row("let the mouse go, close what is open", &[tap("escape", Tap::Escape, &["Escape"])]),
             row("quit", &[tap("quit", Tap::Quit, &["Ctrl+Q"])]),
         ],
     ),

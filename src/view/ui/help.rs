@@ -12,7 +12,7 @@ const HEADING_LINES: usize = 2;
 /// Shows the help in as many columns as fit, with letters as large as fit.
 pub fn show(context: &Context, keys: &Keymap, letters: &Letters) {
     let room = context.content_rect().size() * 0.94;
-    let columns = if room.x > 760.0 { split(2) } else { split(1) };
+    let columns = if room.x > 560.0 { split(2) } else { split(1) };
     let lines = columns.iter().map(|column| lines_of(column)).max().unwrap_or(1);
     let widest = 46.0 * columns.len() as f32;
     // A line is a letter and a half high, a letter half as wide.

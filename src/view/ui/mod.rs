@@ -15,7 +15,7 @@ use super::chord::Letters;
 use super::debug::DebugStatus;
 use super::edit::property::Property;
 use super::keymap::Keymap;
-use super::status::{Level, Measured, Status};
+use super::status::{Level, Measured, Status, altered};
 use egui::{
     Align2, Area, Context, Event, Id, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, RichText,
     ViewportId, pos2, vec2,
@@ -36,6 +36,8 @@ pub struct Content<'a> {
     pub loading: Option<&'a str>,
     /// A line that passes.
     pub notice: &'a str,
+    /// Which other picture is shown, and up to which part of the width.
+    pub compared: Option<(&'static str, f64)>,
     /// For the help.
     pub keys: &'a Keymap,
     /// For the help.
@@ -133,12 +135,24 @@ impl Ui {
         });
         let Some(pos) = pos.or(self.context.pointer_latest_pos()) else { return false };
         let over = self.context.layer_id_at(pos).is_some_and(|layer| layer.order != egui::Order::Background);
+        if pressed && !over {
+            self.let_go();
+        }
         if button != MouseButton::Left || !(over || self.context.is_using_pointer()) {
             return false;
         }
         let button = PointerButton::Primary;
         self.events.push(Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE });
         true
+    }
+
+    /// The keyboard is the picture's again; a number that is being typed counts as it is.
+    fn let_go(&self) {
+        self.context.memory_mut(|memory| {
+            if let Some(id) = memory.focused() {
+                memory.surrender_focus(id);
+            }
+        });
     }
 
     /// Whether what is typed goes into a card.
@@ -176,7 +190,9 @@ impl Ui {
     #[must_use]
     pub fn is_bare(&self, content: &Content) -> bool {
         let silent = content.notice.is_empty()
+            && content.status.and_then(altered).is_none()
             && content.loading.is_none()
+            && content.compared.is_none()
             && content
                 .status
                 .is_none_or(|status| status.debug == DebugStatus::default() && status.edit.is_none());
@@ -192,6 +208,8 @@ impl Ui {
         if let Some(status) = content.status {
             if self.level != Level::None {
                 strip::show(context, status, content.measured, self.level);
+            } else if let Some(text) = altered(status) {
+                strip::show_altered(context, &text);
             }
             if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None) {
                 legend::show(context, legend);
@@ -209,6 +227,14 @@ impl Ui {
         }
         if let Some(prompt) = &self.prompt {
             open::show(context, prompt);
+        }
+        if let Some((name, part)) = content.compared {
+            // Below the status, also where that is as wide as the window.
+            card(context, "compared", Align2::CENTER_TOP, vec2(0.0, 7.0 * style::MARGIN), |ui| {
+                ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
+                let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
+                ui.label(RichText::new(text).color(style::ACCENT));
+            });
         }
         if let Some(text) = content.loading {
             card(context, "loading", Align2::CENTER_CENTER, vec2(0.0, 0.0), |ui| {
@@ -242,8 +268,11 @@ pub fn card(
 
 #[cfg(test)]
 mod tests {
+    use super::super::edit::EditStatus;
+    use super::super::edit::property::Row;
     use super::super::status::tests::status;
     use super::*;
+    use std::sync::Arc;
 
     fn drawn(size: UVec2, display: f64, change: impl FnOnce(&mut Ui), background: u8) -> Vec<u8> {
         let (status, keys, letters) = (status(), Keymap::default(), Letters::default());
@@ -252,6 +281,7 @@ mod tests {
             measured: Measured::default(),
             loading: None,
             notice: "saved cornell_1.png",
+            compared: None,
             keys: &keys,
             letters: &letters,
         };
@@ -296,6 +326,7 @@ mod tests {
             measured: Measured::default(),
             loading: None,
             notice: "",
+            compared: None,
             keys: &keys,
             letters: &letters,
         };
@@ -304,6 +335,13 @@ mod tests {
         let mut rgba = vec![77; 100 * 100 * 4];
         ui.draw(&mut rgba, UVec2::splat(100), 1.0, &content);
         assert!(rgba.iter().all(|&c| c == 77));
+        // But never a picture that is more than the film, as if it were not.
+        let smoothed = Status { smoothed: true, ..status() };
+        let content = Content { status: Some(&smoothed), ..content };
+        assert!(!ui.is_bare(&content));
+        ui.draw(&mut rgba, UVec2::splat(100), 1.0, &content);
+        let changed = rgba.iter().filter(|&&c| c != 77).count() / 4;
+        assert!((100..5000).contains(&changed), "{changed} pixels");
     }
 
     #[test]
@@ -311,5 +349,50 @@ mod tests {
         let size = UVec2::new(960, 540);
         let open = |ui: &mut Ui| ui.help = true;
         assert_eq!(drawn(size, 1.0, open, 50), drawn(size, 1.0, open, 50));
+    }
+    #[test]
+    fn a_click_into_the_picture_takes_the_keyboard_from_the_card() {
+        let mut status = status();
+        let row = |i| Row {
+            property: Property::Position(i),
+            label: "x",
+            value: 1.0,
+            step: 0.1,
+            grows: false,
+            range: [-1e3, 1e3],
+        };
+        let edited = EditStatus { rows: (0..3).map(row).collect(), ..EditStatus::default() };
+        status.edit = Some(Arc::new(edited));
+        let (keys, letters) = (Keymap::default(), Letters::default());
+        let content = Content {
+            status: Some(&status),
+            measured: Measured::default(),
+            loading: None,
+            notice: "",
+            compared: None,
+            keys: &keys,
+            letters: &letters,
+        };
+        let size = UVec2::new(640, 400);
+        let mut ui = Ui::default();
+        let mut frame = |ui: &mut Ui| ui.draw(&mut vec![0; 640 * 400 * 4], size, 1.0, &content);
+        let click = |ui: &mut Ui, frame: &mut dyn FnMut(&mut Ui), at: DVec2| {
+            let mut taken = false;
+            for pressed in [true, false] {
+                ui.pointer(at, (1.0, size));
+                taken |= ui.button(MouseButton::Left, pressed);
+                frame(ui);
+            }
+            taken
+        };
+        frame(&mut ui);
+        // Wherever on the card the numbers are.
+        let mut down = (0..40).map(|i| DVec2::new(600.0, 100.0 + 5.0 * f64::from(i)));
+        assert!(down.any(|at| click(&mut ui, &mut frame, at) && ui.takes_text()), "no number takes text");
+        ui.key(KeyCode::Digit7, Some("7"));
+        frame(&mut ui);
+        assert!(!click(&mut ui, &mut frame, DVec2::new(50.0, 300.0)), "the picture gets it as well");
+        assert!(!ui.takes_text());
+        assert_eq!(ui.edits.last().map(|(_, value)| *value), Some(7.0), "what was typed counts");
     }
 }

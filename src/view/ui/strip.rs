@@ -5,6 +5,13 @@ use super::card;
 use super::style::{BRIGHT, CAUTION, FAINT, MARGIN};
 use egui::{Align2, Context, Grid, RichText, Ui, vec2};
 
+/// What has to be told although nothing is to be shown.
+pub fn show_altered(context: &Context, text: &str) {
+    card(context, "altered", Align2::LEFT_TOP, vec2(MARGIN, MARGIN), |ui| {
+        ui.label(RichText::new(text).color(CAUTION).small());
+    });
+}
+
 /// Shows the strip, and as much of the rest as `level` wants.
 pub fn show(context: &Context, status: &Status, measured: Measured, level: Level) {
     card(context, "status", Align2::LEFT_TOP, vec2(MARGIN, MARGIN), |ui| {
