@@ -63,6 +63,9 @@ fn a_refitted_hierarchy_hits_what_a_new_one_hits() {
     let mut collapsed = triangles.clone();
     collapsed[9] = [Vec3::ZERO; 3];
     assert!(Blas::build(&collapsed).refit(&triangles).is_none(), "one has come back");
+    let mut line = triangles.clone();
+    line[9][2] = line[9][1];
+    assert!(blas.refit(&line).is_none(), "one has no surface any more");
 }
 
 #[test]

@@ -25,6 +25,46 @@ fn nothing_is_hit_where_there_is_nothing() {
     assert!(!Tlas::build(vec![place(&[], DAffine3::IDENTITY)]).any_hit(&ray));
 }
 
+/// A mesh far from its own origin that is brought back to the world's: rounding its ray in local space moves it by a thousand times
+/// the world's own rounding. The top level must not be stricter than what is below it.
+#[test]
+fn meshes_far_from_their_origin_are_not_missed_by_their_boxes() {
+    for far in [1e3, 1e5, 1e6f32] {
+        let tile = |x: f32| {
+            let [a, b] = [Vec3::new(x, far, -1.0), Vec3::new(x, far, 1.0)];
+            let [c, d] = [Vec3::new(x + 1.0, far, 1.0), Vec3::new(x + 1.0, far, -1.0)];
+            place(&[[a, b, c], [a, c, d]], DAffine3::from_translation(DVec3::Y * -f64::from(far)))
+        };
+        let tiles = [tile(0.0), tile(1.0)];
+        let tlas = Tlas::build(tiles.to_vec());
+        let mut rng = Rng(7);
+        let mut hits = 0;
+        let grazing: Vec<Ray> = (0..20_000)
+            .map(|_| {
+                let target = Vec3::new(1.0 + rng.vec().x * 0.1, 0.0, rng.vec().z * 0.9);
+                // A few steps of the floats there above the tiles.
+                let origin = Vec3::new(-1.0, rng.vec().y * far * 3e-6, target.z);
+                Ray::new(origin, target - origin)
+            })
+            .collect();
+        for (ray, found) in grazing.iter().zip(closest_hits(&tlas, &grazing)) {
+            let below = tiles.iter().filter_map(|tile| {
+                let inverse = tile.local_from_world();
+                let local = Ray {
+                    origin: inverse.transform_point3(ray.origin.as_dvec3()).as_vec3(),
+                    direction: inverse.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
+                    t_max: ray.t_max,
+                };
+                tile.blas().closest_hit(&local)
+            });
+            let nearest = below.map(|hit| hit.t).min_by(f32::total_cmp);
+            assert_eq!(found.map(|hit| hit.t), nearest, "{far}: {ray:?}");
+            hits += usize::from(nearest.is_some());
+        }
+        assert!(hits > 1000, "{far}: {hits}");
+    }
+}
+
 /// A file's instances as a top level; those that are flat have no surface.
 fn tlas_of(meshes: &[(Arc<TriangleMesh>, DAffine3)], also: DAffine3) -> Tlas {
     let mut built: HashMap<*const TriangleMesh, Arc<Blas>> = HashMap::new();

@@ -1,5 +1,6 @@
 //! Triangles that moved a little: the same hierarchy with new boxes.
 
+use super::build::has_surface;
 use super::leaves::fill_leaf;
 use super::merge::leaf_cost;
 use super::wide::{Child, WIDTH};
@@ -18,8 +19,12 @@ impl Blas {
     /// rays would cost more than 1.3 times what they did when it was built.
     #[must_use]
     pub fn refit(&self, triangles: &[[Vec3; 3]]) -> Option<Self> {
-        let finite = |corners: &[Vec3; 3]| corners.iter().all(|p| p.is_finite());
-        if self.wide.prims.len() != triangles.len() || !triangles.iter().all(finite) {
+        if self.wide.prims.len() != triangles.len() || !triangles.iter().all(has_surface) {
+            return None;
+        }
+        // As many may also be parts of some and nothing of others.
+        let mut there = vec![false; triangles.len()];
+        if self.wide.prims.iter().any(|&id| std::mem::replace(&mut there[id as usize], true)) {
             return None;
         }
         let built = self.built_cost.unwrap_or_else(|| self.cost());

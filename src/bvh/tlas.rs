@@ -84,14 +84,26 @@ impl Placement {
         if self.identity || local.is_empty() {
             return local;
         }
+        let room = self.stray();
         (0..8).fold(Aabb::EMPTY, |aabb, corner| {
             let pick = |axis: usize| {
                 f64::from(if corner >> axis & 1 == 0 { local.min[axis] } else { local.max[axis] })
             };
             let p = self.world_from_local.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
-            let p = p.clamp(DVec3::splat(f64::from(f32::MIN)), DVec3::splat(f64::from(f32::MAX))).as_vec3();
-            aabb.union(Aabb { min: p.map(f32::next_down), max: p.map(f32::next_up) })
+            let [min, max] = [p - room, p + room].map(|p| {
+                p.clamp(DVec3::splat(f64::from(f32::MIN)), DVec3::splat(f64::from(f32::MAX))).as_vec3()
+            });
+            aabb.union(Aabb { min: min.map(f32::next_down), max: max.map(f32::next_up) })
         })
+    }
+
+    /// How far in the world a ray strays that is rounded to floats where it starts in local space, but for what grows with its way
+    /// there (see [`Placement::condition`]): much where a mesh is far from its own origin.
+    fn stray(&self) -> DVec3 {
+        let local = self.blas.bounds();
+        let far = local.min.abs().max(local.max.abs()).as_dvec3() * f64::from(f32::EPSILON);
+        let m = self.world_from_local.matrix3;
+        m.x_axis.abs() * far.x + m.y_axis.abs() * far.y + m.z_axis.abs() * far.z
     }
 
     /// Bound on how a rounding error in local space grows in world space, relative to coordinates.
