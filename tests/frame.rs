@@ -4,8 +4,9 @@ use bevy_ecs::hierarchy::ChildOf;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{LogLevel, ScheduleBuildSettings};
-use glam::{DVec3, UVec2, Vec2, Vec3};
+use glam::{DAffine3, DVec3, UVec2, Vec2, Vec3};
 use penumbra::app::{App, Frame, FrameBudget, FrameStats};
+use penumbra::bvh::Ray;
 use penumbra::image::{Display, Picture};
 use penumbra::scene::{
     ActiveCamera, Camera, Encoding, Filter, Instance, Light, Material, Mesh, Texels, Texture, Transform,
@@ -13,7 +14,7 @@ use penumbra::scene::{
 };
 use penumbra::sync::Redone;
 use penumbra::trace::explain::{Kind, explain};
-use penumbra::trace::{Film, Integrator, RenderSettings};
+use penumbra::trace::{Film, Geometry, Integrator, RenderSettings};
 use std::sync::Arc;
 
 const SIZE: UVec2 = UVec2::new(40, 30);
@@ -169,6 +170,34 @@ fn the_same_triangles_are_not_built_over_again() {
 }
 
 #[test]
+fn equal_meshes_of_one_frame_are_built_once() {
+    let redone = Stage::settled().redone_by(|s| {
+        let [first, second] = [s.floor, s.floating];
+        let mesh = || quad(3.0);
+        let meshes = [s.app.world.spawn(mesh()).id(), s.app.world.spawn(mesh()).id()];
+        s.get_mut::<Instance>(first).mesh = meshes[0];
+        s.get_mut::<Instance>(second).mesh = meshes[1];
+    });
+    assert_eq!(redone.blas, 1);
+}
+
+/// A scale of 0 leaves something to be seen, from the side that it has left.
+#[test]
+fn what_is_flattened_is_there() {
+    let mut stage = Stage::settled();
+    let floor = stage.floor;
+    let there = |stage: &mut Stage, scale: DVec3| {
+        stage.redone_by(|s| s.get_mut::<Transform>(floor).0 = DAffine3::from_scale(scale));
+        let down = Ray::new(Vec3::new(1.9, 9.0, 1.9), Vec3::NEG_Y);
+        stage.app.world.resource::<Geometry>().tlas.closest_hit(&down).map(|hit| hit.t)
+    };
+    let whole = there(&mut stage, DVec3::ONE);
+    assert!(whole.is_some());
+    assert_eq!(there(&mut stage, DVec3::new(1.0, 0.0, 1.0)), whole);
+    assert_eq!(there(&mut stage, DVec3::X), None, "a line is nothing");
+}
+
+#[test]
 fn a_moved_mesh_keeps_the_structure_of_its_hierarchy() {
     let redone = Stage::settled().redone_by(|s| {
         let mesh = s.floor_mesh;
@@ -214,7 +243,7 @@ fn instances_come_and_go_at_the_top_level() {
         top_level,
         "a mesh, with both its instances"
     );
-    assert_eq!(stage.app.world.resource::<penumbra::trace::Geometry>().instances.len(), 0);
+    assert_eq!(stage.app.world.resource::<Geometry>().instances.len(), 0);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Instances → the top level of the hierarchy.
 
 use super::{Entities, Instructions, MaterialNumbers, MeshBlas, Redone, RenderOrigin};
-use crate::bvh::{Placement, Tlas};
-use crate::scene::{GlobalTransform, Hidden, Instance, Mesh};
+use crate::bvh::{Blas, Placement, Tlas};
+use crate::scene::{GlobalTransform, Hidden, Instance, Mesh, TriangleMesh};
 use crate::trace::Geometry;
 use crate::trace::scene::InstanceData;
 use bevy_ecs::prelude::*;
-use glam::DVec3;
+use glam::{DAffine3, DVec3, Vec3};
 use std::sync::Arc;
 
 /// Picks [`RenderOrigin`] when the first geometry is there: the scene's middle, in steps of a power of two not
@@ -77,15 +77,29 @@ pub fn sync_geometry(
     for (entity, instance, global) in placed {
         let Ok((mesh, MeshBlas(blas))) = meshes.get(instance.mesh) else { continue };
         let render_from_local = origin.render_from(global);
-        let Some(placement) = Placement::new(Arc::clone(blas), render_from_local) else { continue };
+        let there = Placement::new(Arc::clone(blas), render_from_local);
+        let flat = || flattened(&mesh.0, render_from_local);
+        let there = there.map(|placement| (placement, Arc::clone(&mesh.0))).or_else(flat);
+        let Some((placement, mesh)) = there else { continue };
+        let normal_matrix = placement.local_from_world().matrix3.transpose();
         entities.instances.push(entity);
         placements.push(placement);
-        data.push(InstanceData {
-            mesh: Arc::clone(&mesh.0),
-            materials: instance.materials.iter().map(|&m| numbers.of(m)).collect(),
-            normal_matrix: render_from_local.matrix3.inverse().transpose(),
-        });
+        let materials = instance.materials.iter().map(|&m| numbers.of(m)).collect();
+        data.push(InstanceData { mesh, materials, normal_matrix });
     }
     *geometry = Geometry { tlas: Tlas::build(placements).with_isa(instructions.0), instances: data };
     redone.tlas += 1;
+}
+
+/// What becomes of a mesh whose placement makes it flat, as a scale of 0 does: no ray can be taken to where it was made, so it is made
+/// where it is. `None` if it is nowhere.
+fn flattened(mesh: &TriangleMesh, render_from_local: DAffine3) -> Option<(Placement, Arc<TriangleMesh>)> {
+    let place = |p: &Vec3| render_from_local.transform_point3(p.as_dvec3()).as_vec3();
+    // Normals and tangents have no directions any more.
+    let (normals, tangents) = (Vec::new(), Vec::new());
+    let positions = mesh.positions.iter().map(place).collect();
+    let flat = TriangleMesh { positions, normals, tangents, ..mesh.clone() };
+    let corners: Vec<_> = (0..flat.triangles.len()).map(|i| flat.corners(i)).collect();
+    let placement = Placement::new(Arc::new(Blas::build(&corners)), DAffine3::IDENTITY)?;
+    (!placement.blas().bounds().is_empty()).then(|| (placement, Arc::new(flat)))
 }
