@@ -19,6 +19,8 @@ const DARK: f32 = 0.01;
 const MOSTLY: f32 = 0.7;
 /// What glows by less than this share of its colour would show as much of itself in ordinary light: it is no lamp.
 const FAINT: f32 = 0.25;
+/// Stops that a picture is darkened at most: full sunlight takes 17. What is brighter than so much is meant to be blinding.
+const MOST: f32 = 24.0;
 /// Share of the seen surfaces that may be dark because their pixels are at an edge, or black parts of what shines; ...
 const OUTLINE: f32 = 0.1;
 /// ... and that may be dark though they neither shine nor are beside a lit one.
@@ -41,7 +43,7 @@ pub(crate) fn settle(app: &mut App, report: &mut LoadReport, file: &str, choose_
     if !choose_exposure {
         return;
     }
-    match suggest_exposure(&picture) {
+    match suggest_exposure(&picture).map(|stops| stops.max(-MOST)) {
         Some(0.0) => {}
         Some(stops) => {
             app.world.resource_mut::<Display>().exposure = stops;

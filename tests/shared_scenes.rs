@@ -10,8 +10,14 @@ mod support;
 
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
+use glam::UVec2;
+use penumbra::app::FrameBudget;
+use penumbra::image::Display;
+use penumbra::image::develop::develop;
 use penumbra::load::{Card, LoadError, LoadOptions, LoadReport, Remark, SceneSource, Verdict, load};
+use penumbra::open::{Wishes, open};
 use penumbra::scene::{GlobalTransform, Instance, Mesh};
+use penumbra::trace::Film;
 use promises::broken_promise;
 use std::path::Path;
 use support::shared;
@@ -231,4 +237,21 @@ fn patterns_of_the_tables_are_understood() {
     assert!(!says("face no", "no .*face"));
     assert!(says("version 1.0", "x|1\\.0"));
     assert!(says("a jpg", "jpe?g"));
+}
+
+/// Radiance 1e30 is more than a sum of samples can hold, and white all the same; and nobody ran out of time.
+#[test]
+fn a_blinding_lamp_is_white() {
+    let Some(shared) = shared("a_blinding_lamp_is_white") else { return };
+    let file = shared.join("bad-input/own/emissive_1e30.gltf");
+    let wishes = Wishes { size: Some(UVec2::new(16, 12)), ..Wishes::default() };
+    let opened = open(&SceneSource::File(file), &LoadOptions::default(), &wishes);
+    let mut app = opened.unwrap_or_else(|error| panic!("{error}")).app;
+    app.world.resource_mut::<FrameBudget>().sample_target = 4;
+    app.frame();
+    let film = app.world.resource::<Film>();
+    assert_eq!((film.dropped(), film.looked_at()), (0, 1.0));
+    let shown = develop(film, None, app.world.resource::<Display>());
+    let middle = &shown[4 * (6 * 16 + 8)..][..3];
+    assert!(middle.iter().all(|c| *c >= 254), "{middle:?}");
 }

@@ -99,11 +99,23 @@ impl Tried {
         !self.checks.is_empty() && self.checks.iter().all(|check| check.holds() || check.excuse.is_some())
     }
 
-    /// The check that is furthest from keeping its limit.
+    /// The check that is furthest from keeping its limit; before those with an excuse one that has none.
     #[must_use]
     pub fn worst(&self) -> Option<&Check> {
-        let badness = |check: &Check| if check.limit > 0.0 { check.ours / check.limit } else { check.ours };
-        self.checks.iter().max_by(|a, b| badness(a).total_cmp(&badness(b)))
+        let badness = |check: &Check| {
+            let breach = if check.holds() { 0 } else { 1 + u8::from(check.excuse.is_none()) };
+            let ratio = match check.limit {
+                0.0 => check.ours,
+                // Both are slopes, and the steeper the better.
+                limit if limit < 0.0 => limit / check.ours.min(-f64::MIN_POSITIVE),
+                limit => check.ours / limit,
+            };
+            (breach, ratio)
+        };
+        self.checks.iter().max_by(|a, b| {
+            let (a, b) = (badness(a), badness(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        })
     }
 }
 
@@ -170,5 +182,21 @@ mod tests {
         ids.sort_unstable();
         ids.dedup();
         assert_eq!(ids.len(), cases().len());
+    }
+
+    #[test]
+    fn what_broke_is_named_before_what_is_excused() {
+        let check = |what: &str, ours: f64, limit: f64| Check::new(what, 1, "", ours, limit);
+        let excused = Check { excuse: Some("known"), ..check("excused", 624.0, 16.0) };
+        let worst = |checks: Vec<Check>| tried(checks).worst().map(|check| check.what.clone());
+        let broken = check("broken", 2.0, 0.0);
+        assert_eq!(worst(vec![broken.clone(), excused.clone(), check("held", 0.9, 1.0)]).unwrap(), "broken");
+        assert_eq!(worst(vec![check("held", 9.0, 9.5), excused]).unwrap(), "excused");
+        // Slopes, which have to be below.
+        assert_eq!(worst(vec![check("steep", -1.2, -0.7), check("flat", -0.5, -0.7)]).unwrap(), "flat");
+        assert_eq!(
+            worst(vec![Check::none("nothing tried", 0, "", 0), check("held", 1.0, 1.0)]).unwrap(),
+            "nothing tried"
+        );
     }
 }

@@ -7,7 +7,7 @@ use super::spot::{ALBEDO, Spot, Thing};
 use crate::scene::{Alpha, Glass, Glossy, Light, Material};
 use crate::torture::stage::{Estimate, Stage, ball, quad, reds, settings};
 use crate::torture::{Case, Check, Effort, Trial};
-use crate::trace::allot::EVEN;
+use crate::trace::allot::{EVEN, RIPE};
 use crate::trace::{Film, Integrator, RenderSettings, TraceScene, hurry, trace_adaptive, trace_pass};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -86,8 +86,10 @@ fn adaptive(trial: &Trial<'_>) -> Vec<Check> {
     let (stage, exact) = (strip(), strip_in_closed_form());
     let seeds = trial.pick(320, 400, 100_000);
     let mut checks = Vec::new();
-    for (samples, in_a_hurry) in [(2, true), (EVEN, true), (8, true), (8, false), (16, false), (64, false)] {
-        if trial.effort != Effort::Long && samples > 16 {
+    for (samples, in_a_hurry) in
+        [(2, true), (EVEN, true), (8, true), (8, false), (RIPE + 4, false), (64, false)]
+    {
+        if trial.effort != Effort::Long && samples > RIPE + 4 {
             continue;
         }
         // Pictures of few samples are noisier, and sooner done.

@@ -149,7 +149,7 @@ pub fn a_day<A: Accumulator>(count: u64, seed: u64) -> Vec<Check> {
 pub fn poison<A: Accumulator>() -> Check {
     let (mut pixel, mut wrong) = (A::default(), 0);
     pixel.add(0, 1.0);
-    let bad = [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e30];
+    let bad = [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
     for (i, bad) in (1..).zip(bad) {
         wrong += u64::from(pixel.add(i, bad));
     }

@@ -11,7 +11,8 @@ struct Sum(i128);
 
 impl Sum {
     const FRACTION_BITS: i32 = 60;
-    const LIMIT: f32 = (1u64 << 35) as f32;
+    /// The greatest float below 2³⁵.
+    const MOST: f32 = ((1u64 << 35) - (1u64 << 11)) as f32;
 
     #[inline]
     fn add(&mut self, sample: f32) {
@@ -56,14 +57,15 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// Adds the linear RGB `radiance` of sample number `index`. False if it was dropped since it is
-    /// not finite, or below −2³⁵ or above 2³⁵, where no sum of light should be.
+    /// Adds the linear RGB `radiance` of sample number `index`. False if it was dropped since it is not finite. What is
+    /// below −2³⁵ or above 2³⁵, where no sum of light should be, is cut off there: black instead of blinding would be
+    /// a worse error.
     #[inline]
     pub fn add(&mut self, index: u32, radiance: Vec3) -> bool {
-        // Not `any(> limit)`: a NaN must fail too.
-        if !radiance.to_array().iter().all(|c| c.abs() < Sum::LIMIT) {
+        if !radiance.is_finite() {
             return false;
         }
+        let radiance = radiance.clamp(-Vec3::splat(Sum::MOST), Vec3::splat(Sum::MOST));
         let half = index as usize & 1;
         for (sum, sample) in self.sums[half].iter_mut().zip(radiance.to_array()) {
             sum.add(sample);
