@@ -7,7 +7,7 @@ mod stage;
 use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::FrameBudget;
 use penumbra::scene::{Light, Material};
-use penumbra::trace::allot::{EVEN, shares};
+use penumbra::trace::allot::{AGAIN, EVEN, RIPE, shares};
 use penumbra::trace::{Film, Integrator, RenderSettings, TraceScene, hurry, trace_adaptive, trace_pass};
 use stage::{Frames as _, Stage, quad, reds, settings};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -189,6 +189,66 @@ fn a_hurry_ends_also_where_only_a_part_is_refined() {
     assert_eq!(film.complete_samples(), EVEN);
     film.reset();
     assert!(!film.has_first_shares() && !film.is_allotted());
+}
+
+/// A film whose shares are found anew, broken off whenever it has asked so often whether to go on.
+fn ripened(stage: &Stage, samples: u32, patience: u32) -> Film {
+    let scene = stage.scene();
+    let mut film = Film::new(scene.settings.size, 0);
+    for turn in 0.. {
+        if film.complete_samples() >= samples {
+            break;
+        }
+        assert!(turn < 100_000, "never ends");
+        let asked = AtomicU32::new(0);
+        trace_adaptive(&scene, &mut film, samples, 1, || asked.fetch_add(1, Ordering::Relaxed) < patience);
+    }
+    film
+}
+
+/// Bars that are seen through between others, a twentieth of a pixel wide: few of the first samples meet one.
+#[test]
+fn shares_are_found_anew_when_more_is_known() {
+    let mut stage = edge(48);
+    let bright = Material { emission: Vec3::splat(2.0), ..Material::lambert(Vec3::ZERO) };
+    for i in 0..6 {
+        let x = f64::from(i) * 0.2 - 0.5;
+        let bar = quad(Vec3::new(0.0, 0.5, -9.0), Vec3::Z * 18.0, Vec3::X * 0.002);
+        stage.add_mesh(bar, bright.clone(), DAffine3::from_translation(DVec3::X * x));
+    }
+    stage.trace(1);
+    let truth = reds(&film(&stage, 99, 2048, false));
+    let error = |samples: u32, again: bool| {
+        let mut moments = Moments::default();
+        for seed in 0..10 {
+            let settings = RenderSettings { seed, ..*stage.scene().settings };
+            let scene = TraceScene { settings: &settings, ..stage.scene() };
+            let mut film = Film::new(settings.size, 0);
+            while film.mean_samples() < f64::from(samples) - 0.5 {
+                match again || !film.is_allotted() {
+                    true => trace_adaptive(&scene, &mut film, samples, 1, || true),
+                    false => trace_pass(&scene, &mut film, samples, 1, || true),
+                };
+            }
+            moments.add(&reds(&film));
+        }
+        moments.mean_square_from(&truth).sqrt()
+    };
+    let (once, again) = (error(64, false), error(64, true));
+    println!("error with shares found once: {once:.5}, anew: {again:.5}");
+    assert!(once > 1.1 * again, "{once} {again}");
+}
+
+#[test]
+fn shares_found_anew_come_to_the_same_however_often_it_is_broken_off() {
+    let stage = edge(40);
+    let whole = ripened(&stage, RIPE + 8, u32::MAX);
+    assert!(whole.is_allotted() && !whole.can_allot_again());
+    assert_eq!(whole.even_samples(), AGAIN);
+    assert!((0..40 * 40).all(|i| whole.pixel(i % 40, i / 40).count() >= u64::from(AGAIN)));
+    assert!(whole == ripened(&stage, RIPE + 8, 3));
+    // One whose second sample went to the edge knows nothing apart by then.
+    assert!(!hurried(&stage, RIPE, u32::MAX).can_allot_again());
 }
 
 #[test]

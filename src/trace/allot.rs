@@ -10,6 +10,11 @@ use glam::{UVec2, Vec4};
 
 /// Even samples per pixel before shares are given out.
 pub const EVEN: u32 = 3;
+/// By so many samples of each pixel shares are found anew, and better, once the picture has [`RIPE`] of them on average: what the very
+/// first have missed, a thin post perhaps, is seen by then. As measured, with both numbers.
+pub const AGAIN: u32 = 8;
+/// See [`AGAIN`]. Most pixels have as many by then; the others get them first.
+pub const RIPE: u32 = 10;
 /// Nobody gets less than this share for good, or ever more than that many: what the first samples have missed must have its
 /// chance.
 const LEAST: f32 = 0.05;

@@ -47,6 +47,12 @@ pub fn trace_adaptive(
         return trace_first_shares(scene, film, until, keep_going);
     }
     if film.is_allotted() {
+        // Where only a part is refined, the whole picture would have to wait for it.
+        let again = film.can_allot_again() && film.region().is_none();
+        if again && film.complete_samples() >= allot::RIPE {
+            return share_out_again(scene, film, keep_going);
+        }
+        let until = if again { until.min(allot::RIPE) } else { until };
         return trace_pass(scene, film, until, step, keep_going);
     }
     let rays = trace_pass(scene, film, until.min(allot::EVEN), step, keep_going);
@@ -90,12 +96,28 @@ fn trace_first_shares(
 /// Gives out shares, if it is time.
 fn share_out(scene: &TraceScene, film: &mut Film) {
     if !film.is_allotted() && film.complete_samples() == allot::EVEN {
-        let mut shares = allot::shares(film);
-        if scene.settings.shares_paths() {
-            reuse::even_out(&mut shares, film.size().x as usize);
-        }
+        let shares = shares(scene, film);
         film.allot(&shares);
     }
+}
+
+/// Gives each pixel the samples by which shares are found anew, and then those.
+fn share_out_again(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() -> bool + Sync) -> RayCounts {
+    let work = Work::Even { until: film.first_sample().saturating_add(allot::AGAIN) };
+    let rays = trace_tiles(scene, film, work, film.complete_samples(), keep_going);
+    if film.is_ripe() {
+        let shares = shares(scene, film);
+        film.allot_again(&shares);
+    }
+    rays
+}
+
+fn shares(scene: &TraceScene, film: &Film) -> Vec<f32> {
+    let mut shares = allot::shares(film);
+    if scene.settings.shares_paths() {
+        reuse::even_out(&mut shares, film.size().x as usize);
+    }
+    shares
 }
 
 /// Gives the pixels of one colour of the chess board their first sample, if none has any, as long as `keep_going`: where

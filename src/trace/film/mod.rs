@@ -6,17 +6,17 @@
 //! the halves are scrambled independently, so their difference measures the error of their mean.
 
 mod pixel;
+mod shares;
 mod tile;
 
 pub use pixel::Pixel;
 pub use tile::Tile;
 
-use super::allot::EVEN;
 use super::sightlines::Sightlines;
 use bevy_ecs::prelude::*;
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 use pixel::EMPTY;
-use tile::Early;
+use shares::Stage;
 
 /// Side of a tile in pixels.
 pub const TILE: u32 = 8;
@@ -30,17 +30,6 @@ pub struct Film {
     /// See [`Film::confine`].
     region: Option<[UVec2; 2]>,
     tiles: Vec<Tile>,
-}
-
-/// Which pixels get how many of the next samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// All as many.
-    Even,
-    /// After so many of each, shares that end: see [`Film::allot_first`].
-    FirstShares(u32),
-    /// After so many of each, shares for good: see [`Film::allot`].
-    Shares(u32),
 }
 
 impl Film {
@@ -181,105 +170,6 @@ impl Film {
         })
     }
 
-    /// Whether it has the first sample of each pixel, also where nothing is refined now, and no other.
-    #[must_use]
-    pub fn has_one_each(&self) -> bool {
-        let of = |tile: &Tile| tile.next_sample.checked_sub(self.first_sample) == Some(1) && !tile.half;
-        !self.is_allotted() && self.region.is_none() && self.tiles.iter().all(of)
-    }
-
-    /// From now on keeps apart what the first [`EVEN`] samples of each pixel say, of which each has one: the later share of
-    /// another must not depend on how many this one had by then, since that was found from the other.
-    pub fn keep_early(&mut self) {
-        for tile in &mut self.tiles {
-            let early = tile.pixels().map(|pixel| Early::new(pixel, EVEN as u8 - 1)).collect();
-            tile.early = early;
-        }
-    }
-
-    /// Begins to give out shares, whole numbers of samples, after [`Film::keep_early`] by what that has kept. When
-    /// [`Film::end_first_shares`] ends it, each pixel has as many as it must have for [`Film::allot`].
-    pub fn allot_first(&mut self, shares: &[f32]) {
-        self.stage = Stage::FirstShares(self.complete_samples());
-        self.give_shares(shares);
-    }
-
-    /// Ends what [`Film::allot_first`] began, if all tiles have come so far, also those that rest now. Samples beyond are
-    /// counted toward what [`Film::allot`] gives out next.
-    pub fn end_first_shares(&mut self) -> bool {
-        if !self.tiles.iter().all(|tile| tile.complete == EVEN) {
-            return false;
-        }
-        self.stage = Stage::Even;
-        for tile in &mut self.tiles {
-            tile.next_sample += EVEN - 1;
-            tile.more.iter_mut().for_each(|more| *more -= EVEN - 1);
-        }
-        true
-    }
-
-    /// Whether shares by the first sample of each pixel are being given out. Some pixels may have no other.
-    #[must_use]
-    pub fn has_first_shares(&self) -> bool {
-        matches!(self.stage, Stage::FirstShares(_))
-    }
-
-    /// Means of both halves of each pixel, as far as they have samples, and of all; by the first [`EVEN`] samples if they are
-    /// known apart. Rows from the top.
-    pub(super) fn early(&self) -> impl Iterator<Item = (Option<[Vec3; 2]>, Vec3)> {
-        let across = self.size.x.div_ceil(TILE);
-        let places = (0..self.size.y).flat_map(|y| (0..self.size.x).map(move |x| (x, y)));
-        places.map(move |(x, y)| {
-            let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
-            if let Some(early) = tile.early.get((y % TILE * tile.size.x + x % TILE) as usize) {
-                return (early.halves(), early.mean());
-            }
-            let pixel = self.pixel(x, y);
-            let halves = pixel.half_mean(0).zip(pixel.half_mean(1));
-            (halves.map(|(a, b)| [a.as_vec3(), b.as_vec3()]), pixel.mean().as_vec3())
-        })
-    }
-
-    /// From now on gives each pixel its own share of all samples, of mean 1; `shares` are in rows of the whole picture.
-    /// Every pixel must have the same number of samples, one at least, but for those of [`Film::allot_first`].
-    ///
-    /// A picture stays unbiased only if how many samples a pixel gets does not depend on what they say: so
-    /// the share of one pixel is to be found from others.
-    pub fn allot(&mut self, shares: &[f32]) {
-        self.stage = Stage::Shares(self.complete_samples());
-        self.give_shares(shares);
-        self.tiles.iter_mut().for_each(|tile| tile.early = Vec::new());
-    }
-
-    fn give_shares(&mut self, shares: &[f32]) {
-        let even = self.even_samples();
-        debug_assert!(!self.tiles.iter().any(Tile::is_half), "a half tile has no even number of samples");
-        let across = self.size.x as usize;
-        for tile in &mut self.tiles {
-            let [x, y, width, height] =
-                [tile.origin.x, tile.origin.y, tile.size.x, tile.size.y].map(|n| n as usize);
-            tile.shares.clear();
-            tile.shares.extend((y..y + height).flat_map(|y| &shares[y * across + x..][..width]));
-            tile.more.resize(width * height, 0);
-            tile.complete = even;
-        }
-    }
-
-    /// Whether shares have been given out, be it first ones.
-    #[must_use]
-    pub fn is_allotted(&self) -> bool {
-        self.stage != Stage::Even
-    }
-
-    /// Samples that each pixel had before [`Film::allot`]; 0 without it.
-    #[must_use]
-    pub fn even_samples(&self) -> u32 {
-        match self.stage {
-            Stage::Even => 0,
-            Stage::FirstShares(even) | Stage::Shares(even) => even,
-        }
-    }
-
     /// Samples that every pixel has its share of.
     #[must_use]
     pub fn complete_samples(&self) -> u32 {
@@ -304,8 +194,13 @@ impl Film {
     /// The part of the pixels worked on that has samples.
     #[must_use]
     pub fn looked_at(&self) -> f64 {
-        let pixels = || self.working().flat_map(Tile::pixels);
-        pixels().filter(|pixel| pixel.count() > 0).count() as f64 / pixels().count() as f64
+        // Also those of which every sample was dropped.
+        let seen = |tile: &Tile| match tile.next_sample > self.first_sample {
+            true => tile.pixels.len(),
+            false => tile.pixels().filter(|pixel| pixel.count() > 0).count(),
+        };
+        let pixels: usize = self.working().map(|tile| tile.pixels.len()).sum();
+        self.working().map(seen).sum::<usize>() as f64 / pixels as f64
     }
 
     /// Samples dropped because they were not finite.
@@ -318,16 +213,6 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn no_share_goes_beyond_the_last_index() {
-        let mut film = Film::new(UVec2::ONE, u32::MAX - 10);
-        film.tiles_mut()[0].next_sample += 4;
-        film.allot(&[100.0]);
-        let tile = &film.tiles()[0];
-        assert_eq!(tile.goal(0, 3), 6);
-        assert_eq!(tile.goal(0, u32::MAX), 6);
-    }
 
     #[test]
     fn tiles_beside_the_region_rest_and_do_not_count() {

@@ -46,10 +46,15 @@ pub(super) struct Early {
 }
 
 impl Early {
-    /// Of a pixel with its first sample, or without if it was dropped, and `missing` more to come.
+    /// Of a pixel with its very first samples, as far as they were not dropped, and `missing` more to come.
     pub(super) fn new(pixel: &Pixel, missing: u8) -> Self {
-        let sums = [0, 1].map(|half| pixel.half_mean(half).unwrap_or_default().as_vec3());
-        Self { sums, counts: pixel.counts().map(|count| count as u8), missing }
+        let counts = pixel.counts();
+        let sum = |half: usize| pixel.half_mean(half).unwrap_or_default() * f64::from(counts[half]);
+        Self {
+            sums: [0, 1].map(|half| sum(half).as_vec3()),
+            counts: counts.map(|count| count as u8),
+            missing,
+        }
     }
 
     /// Means of both halves; `None` if one has no sample.
