@@ -9,7 +9,7 @@ use super::film::Tile;
 use super::integrator::{Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, Path, ROULETTE_DEPTH};
 use super::light::FlatLight;
 use super::light_tree::Receiver;
-use super::lights::Pick;
+use super::lights::{KNOWN_LIGHTS, Pick};
 use super::quad_arrivals::{compute_quad, sample_quad};
 use super::reuse::{End, Start};
 use super::sampler::SamplerRow;
@@ -63,7 +63,8 @@ impl Diffuse {
         // Through a lens one sees more than through a point.
         let is_sharp = !scene.viewpoint.has_lens();
         self.lights_in_view = !is_sharp || scene.lights.any_shape(|bounds| !window.hides(&bounds));
-        self.window = (is_sharp && scene.settings.shafts && scene.lights.samples_all(0)).then_some(window);
+        self.window =
+            (is_sharp && scene.settings.shafts && scene.lights.len() <= KNOWN_LIGHTS).then_some(window);
         self.sightlines = std::mem::take(&mut tile.sightlines);
         self.sightlines.tidy();
         self.asked.clear();
@@ -197,12 +198,7 @@ impl Batch {
         let depth = self.path(block.paths[0] as usize).depth;
         let base = 1 + depth * PAIRS_PER_BOUNCE;
         if !scene.lights.samples_all(depth) {
-            for i in 0..block.count {
-                let to = Receiver { point: block.position.get(i), normal: block.normal.get(i) };
-                for look in looks(scene, block.samplers.get(i), depth, to) {
-                    self.light_point(scene, block, i, &look);
-                }
-            }
+            self.light_by_chance(scene, block, depth);
             return;
         }
         let mut arrivals = std::mem::take(&mut self.diffuse.arrivals);
@@ -238,6 +234,39 @@ impl Batch {
                         }
                     }
                 }
+            }
+        }
+        self.diffuse.arrivals = arrivals;
+    }
+
+    /// Samples lights that are chosen by chance, but for those that are known.
+    fn light_by_chance(&mut self, scene: &TraceScene, block: &Block, depth: u32) {
+        if block.known[..block.count].iter().any(Option::is_some) {
+            self.take_known(scene, block);
+        }
+        for i in 0..block.count {
+            let counted = self.diffuse.counted[i];
+            if counted.count_ones() as usize == scene.lights.len() {
+                continue;
+            }
+            let to = Receiver { point: block.position.get(i), normal: block.normal.get(i) };
+            for look in looks(scene, block.samplers.get(i), depth, to) {
+                if counted == 0 || counted >> look.pick.light & 1 == 0 {
+                    self.light_point(scene, block, i, &look);
+                }
+            }
+        }
+    }
+
+    /// Adds what lights bring for sure of which the others are sampled by chance.
+    fn take_known(&mut self, scene: &TraceScene, block: &Block) {
+        let mut arrivals = std::mem::take(&mut self.diffuse.arrivals);
+        for light in 0..scene.lights.len() as u32 {
+            if let FlatLight::Shape(shape) = scene.lights.get(light)
+                && matches!(shape.shape, Shape::Parallelogram(_))
+            {
+                compute_quad(scene, block, &self.diffuse.sightlines, shape, light, &mut arrivals);
+                self.take_certain(block, light, &arrivals);
             }
         }
         self.diffuse.arrivals = arrivals;

@@ -74,6 +74,9 @@ pub struct LightHit<'a> {
 
 /// Up to this many lights are all sampled where the eye looks; more are sampled by chance.
 pub const ALL_LIGHTS: usize = 8;
+/// Of up to this many it is found out what is in their way; they are the bits of a word. Of a room's 24 panels most are seen whole,
+/// and none of these is left to chance.
+pub const KNOWN_LIGHTS: usize = 32;
 /// So often one of many is chosen evenly: what they are expected to bring does not know what is in between.
 const EVENLY: f32 = 0.25;
 /// Up to this many solid lights are not worth a hierarchy.

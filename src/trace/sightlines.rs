@@ -7,7 +7,6 @@ use super::TraceScene;
 use super::blocker::{Blocker, simplify};
 use super::film::Tile;
 use super::light::FlatLight;
-use super::lights::ALL_LIGHTS;
 use super::quad::Quad;
 use super::shape_light::Shape;
 use crate::bvh::{Aabb, Hit, Ray, Shaft};
@@ -16,8 +15,13 @@ use glam::{DVec3, UVec2, Vec2, Vec3};
 /// What is known for one tile, until the scene or the view changes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sightlines {
-    known: Vec<Known>,
+    /// Instance and triangle of each number.
+    known: Vec<(u32, u32)>,
+    /// What keeps each light from each of these, light by light: a part of `blockers`; `None` if nobody knows.
+    looks: Vec<Option<(u32, u32)>>,
     blockers: Vec<Blocker>,
+    /// How many lights there are.
+    lights: usize,
 }
 
 /// What is known is no part of the picture.
@@ -25,15 +29,6 @@ impl PartialEq for Sightlines {
     fn eq(&self, _: &Self) -> bool {
         true
     }
-}
-
-/// What keeps the lights from one triangle's part of the tile.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    /// Instance and triangle.
-    of: (u32, u32),
-    /// By light; `None` if nobody knows.
-    blockers: [Option<(u32, u32)>; ALL_LIGHTS],
 }
 
 /// The view through a tile.
@@ -105,7 +100,7 @@ impl Sightlines {
     /// Finds out about the triangle of `hit`; `None` if nothing can be said. Else a number for [`Sightlines::blockers`].
     pub fn of(&mut self, scene: &TraceScene, window: &Window, hit: &Hit) -> Option<u32> {
         let of = (hit.instance, hit.triangle);
-        if let Some(found) = self.known.iter().position(|known| known.of == of) {
+        if let Some(found) = self.known.iter().position(|known| *known == of) {
             return Some(found as u32);
         }
         let data = &scene.geometry.instances[hit.instance as usize];
@@ -115,19 +110,20 @@ impl Sightlines {
             if placement.is_identity() { p } else { placement.world_from_local().transform_point3(p) }
         });
         let (patch, normal) = window.patch(&corners)?;
-        let mut known = Known { of, blockers: [None; ALL_LIGHTS] };
-        for (light, blockers) in (0..scene.lights.len() as u32).zip(&mut known.blockers) {
-            *blockers = self.look(scene, &patch, normal, light);
+        self.lights = scene.lights.len();
+        for light in 0..self.lights as u32 {
+            let look = self.look(scene, &patch, normal, light);
+            self.looks.push(look);
         }
-        self.known.push(known);
+        self.known.push(of);
         Some(self.known.len() as u32 - 1)
     }
 
-    /// What may be between a light and a point of the triangle of that number; empty if nothing is. `None` if that is
-    /// not known.
+    /// What may be between a light and a point of the triangle of that number; empty if nothing is.
+    /// `None` if that is not known.
     pub fn blockers(&self, number: u32, light: u32) -> Option<&[Blocker]> {
-        let (first, end) = self.known.get(number as usize)?.blockers[light as usize]?;
-        Some(&self.blockers[first as usize..end as usize])
+        let look = self.looks.get(number as usize * self.lights + light as usize)?;
+        look.map(|(first, end)| &self.blockers[first as usize..end as usize])
     }
 
     fn look(
