@@ -33,6 +33,22 @@ fn fresh(test: &str) -> PathBuf {
 }
 
 #[test]
+fn instructions_are_those_that_are_asked_for() {
+    for isa in ["scalar", "sse2"] {
+        let arguments =
+            ["render", "cornell", "--spp", "1", "--resolution", "16x12", "--json", "-q", "--isa", isa];
+        let (code, json, errors) = run("isa", &arguments);
+        assert_eq!(code, Some(0), "{errors}");
+        let summary: Value = serde_json::from_str(&json).unwrap();
+        let native = if cfg!(target_arch = "x86_64") { isa } else { "neon" };
+        assert_eq!(summary["isa"], if isa == "scalar" { isa } else { native });
+    }
+    let (code, _, errors) = run("isa", &["render", "cornell", "--isa", "mmx"]);
+    assert_eq!(code, Some(2));
+    assert!(errors.contains("mmx"), "{errors}");
+}
+
+#[test]
 fn a_render_writes_what_is_asked_for_and_says_what_it_did() {
     let folder = fresh("render");
     let arguments =

@@ -5,7 +5,9 @@ mod stage;
 
 use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::app::{FrameBudget, FrameStats};
+use penumbra::bvh::Isa;
 use penumbra::scene::{Alpha, Glass, Glossy, Light, Material};
+use penumbra::sync::Instructions;
 use penumbra::trace::{Film, Integrator};
 use stage::{Frames as _, Stage, ball, quad, settings};
 use std::sync::atomic::Ordering;
@@ -31,6 +33,26 @@ fn stage() -> Stage {
             Light::Sphere { radius: 0.1, radiance: Vec3::splat(5.0) },
             place(f64::from(i) * 0.4 - 2.0, 2.0, 1.0),
         );
+    }
+    stage.look_wide(DVec3::new(0.0, 1.5, 4.0), DVec3::ZERO);
+    stage
+}
+
+/// Lambert's surfaces under lamps that are computed, cut, sampled and shared: what whole blocks and vectors do.
+fn diffuse(integrator: Integrator) -> Stage {
+    let mut stage = Stage::new(settings(53, 37, integrator, 4));
+    let place = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
+    let floor = quad(Vec3::new(-3.0, -1.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0);
+    stage.add_mesh(floor, Material::lambert(Vec3::splat(0.7)), DAffine3::IDENTITY);
+    stage.add_mesh(ball(8), Material::lambert(Vec3::new(0.7, 0.3, 0.2)), place(-1.0, 0.0, 0.0));
+    let turned =
+        place(1.2, -0.2, 0.3) * DAffine3::from_rotation_y(0.7) * DAffine3::from_scale(DVec3::splat(0.6));
+    stage.add_mesh(ball(4), Material::lambert(Vec3::new(0.2, 0.3, 0.7)), turned);
+    for i in 0..2 {
+        let radiance = [Vec3::splat(3.0 + i as f32); 4];
+        let (edge_u, edge_v) = (Vec3::X * 0.7, Vec3::Z * 0.5);
+        let lamp = Light::Parallelogram { edge_u, edge_v, radiance, two_sided: false };
+        stage.add(lamp, place(f64::from(i) * 2.0 - 1.5, 2.0, 0.5));
     }
     stage.look_wide(DVec3::new(0.0, 1.5, 4.0), DVec3::ZERO);
     stage
@@ -149,4 +171,26 @@ fn the_last_sample_indices_there_are_come_to_an_end() {
     stage.app.world.insert_resource(Film::new(UVec2::new(53, 37), u32::MAX - 4));
     let film = until_done(&mut stage, 64);
     assert_eq!(film.complete_samples(), 4);
+}
+
+/// Which instructions a machine has is no part of the picture.
+#[test]
+fn all_instructions_make_the_same_picture() {
+    let scenes: [(&str, fn() -> Stage); 3] = [
+        ("everything", stage),
+        ("direct", || diffuse(Integrator::Direct)),
+        ("shared paths", || diffuse(Integrator::Path)),
+    ];
+    for (name, make) in scenes {
+        let films = Isa::available().into_iter().map(|isa| {
+            let mut stage = make();
+            stage.app.world.insert_resource(Instructions(isa));
+            budget(&mut stage, |b| b.adaptive = true);
+            (isa, until_done(&mut stage, 12))
+        });
+        let films: Vec<_> = films.collect();
+        for (isa, film) in &films[1..] {
+            assert!(*film == films[0].1, "{name}: {} and {} differ", isa.name(), films[0].0.name());
+        }
+    }
 }
