@@ -251,6 +251,26 @@ fn shares_found_anew_come_to_the_same_however_often_it_is_broken_off() {
     assert!(!hurried(&stage, RIPE, u32::MAX).can_allot_again());
 }
 
+/// A part that was refined before the rest has more samples than shares go by: they are not found anew then.
+#[test]
+fn a_part_that_is_ahead_holds_up_nobody() {
+    let stage = edge(40);
+    let scene = stage.scene();
+    for ahead in [5, 20, 300] {
+        let mut film = Film::new(scene.settings.size, 0);
+        film.confine(Some([UVec2::splat(8), UVec2::splat(16)]));
+        trace_pass(&scene, &mut film, ahead, ahead, || true);
+        film.confine(None);
+        for turn in 0.. {
+            if film.complete_samples() >= 24 {
+                break;
+            }
+            assert!(turn < 100, "{ahead}: never ends");
+            trace_adaptive(&scene, &mut film, 24, 1, || true);
+        }
+    }
+}
+
 #[test]
 fn a_second_pass_that_has_begun_is_no_time_for_a_hurry() {
     let stage = edge(40);

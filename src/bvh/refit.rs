@@ -24,7 +24,9 @@ impl Blas {
         }
         // As many may also be parts of some and nothing of others.
         let mut there = vec![false; triangles.len()];
-        if self.wide.prims.iter().any(|&id| std::mem::replace(&mut there[id as usize], true)) {
+        let is_new =
+            |&id: &u32| there.get_mut(id as usize).is_some_and(|there| !std::mem::replace(there, true));
+        if !self.wide.prims.iter().all(is_new) {
             return None;
         }
         let built = self.built_cost.unwrap_or_else(|| self.cost());

@@ -28,6 +28,11 @@ impl SceneFiles {
         self.lock().extend(others);
     }
 
+    /// Looks at all of them anew.
+    pub fn refresh(&self) {
+        self.lock().iter_mut().for_each(|(path, known)| *known = stamp(path));
+    }
+
     /// Remembers a file that is about to be read, or that would be if it were there.
     pub(super) fn note(&self, path: &Path) {
         let mut files = self.lock();

@@ -95,11 +95,19 @@ pub fn sync_geometry(
 /// where it is. `None` if it is nowhere.
 fn flattened(mesh: &TriangleMesh, render_from_local: DAffine3) -> Option<(Placement, Arc<TriangleMesh>)> {
     let place = |p: &Vec3| render_from_local.transform_point3(p.as_dvec3()).as_vec3();
-    // Normals and tangents have no directions any more.
-    let (normals, tangents) = (Vec::new(), Vec::new());
-    let positions = mesh.positions.iter().map(place).collect();
-    let flat = TriangleMesh { positions, normals, tangents, ..mesh.clone() };
-    let corners: Vec<_> = (0..flat.triangles.len()).map(|i| flat.corners(i)).collect();
+    let positions: Vec<Vec3> = mesh.positions.iter().map(place).collect();
+    let corners = |[a, b, c]: [u32; 3]| [a, b, c].map(|i| positions[i as usize]);
+    let corners: Vec<_> = mesh.triangles.iter().map(|&corner| corners(corner)).collect();
     let placement = Placement::new(Arc::new(Blas::build(&corners)), DAffine3::IDENTITY)?;
-    (!placement.blas().bounds().is_empty()).then(|| (placement, Arc::new(flat)))
+    // Normals and tangents have no directions any more.
+    let flat = || TriangleMesh {
+        positions,
+        uvs: mesh.uvs.clone(),
+        second_uvs: mesh.second_uvs.clone(),
+        colors: mesh.colors.clone(),
+        triangles: mesh.triangles.clone(),
+        slots: mesh.slots.clone(),
+        ..TriangleMesh::default()
+    };
+    (!placement.blas().bounds().is_empty()).then(|| (placement, Arc::new(flat())))
 }

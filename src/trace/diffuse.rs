@@ -5,7 +5,7 @@
 use super::block::{Arrivals, Block, Depart, Departures, LANES, Placed};
 use super::bsdf::normal::facing;
 use super::connect::{Look, Shadow, looks, mesh_emission, power_heuristic, shadow_key};
-use super::film::Tile;
+use super::film::{TILE, Tile};
 use super::integrator::{Batch, Bounce, DIRECTION, LIGHT, LOBE, PAIRS_PER_BOUNCE, Path, ROULETTE_DEPTH};
 use super::light::FlatLight;
 use super::light_tree::Receiver;
@@ -66,7 +66,8 @@ impl Diffuse {
         self.window =
             (is_sharp && scene.settings.shafts && scene.lights.len() <= KNOWN_LIGHTS).then_some(window);
         self.sightlines = std::mem::take(&mut tile.sightlines);
-        self.sightlines.tidy();
+        let tiles = (size.x.div_ceil(TILE) * size.y.div_ceil(TILE)) as usize;
+        self.sightlines.tidy(tiles);
         self.asked.clear();
         self.asked.resize(ASKED, ((u32::MAX, u32::MAX), None));
     }

@@ -165,7 +165,7 @@ impl Batch {
                     let room = TOGETHER - self.keys.len() as u32;
                     let goal = match work {
                         Work::Shares { beyond } => tile.goal(i as usize, beyond),
-                        Work::Even { until } => until - tile.next_sample,
+                        Work::Even { until } => until.saturating_sub(tile.next_sample),
                         Work::Half => 0,
                     };
                     let count = goal.saturating_sub(more).min(room);

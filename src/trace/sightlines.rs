@@ -45,6 +45,9 @@ const LOOKED_AT: usize = 32;
 /// So many triangles in view are remembered.
 const MANY: usize = 32;
 
+/// So many bytes of outlines are remembered by all tiles together.
+const MEMORY: usize = 1 << 30;
+
 impl Window {
     /// Of a tile of a picture of `size`.
     pub fn new(scene: &TraceScene, tile: &Tile, size: UVec2) -> Self {
@@ -90,9 +93,10 @@ impl Window {
 }
 
 impl Sightlines {
-    /// Forgets if it is much.
-    pub fn tidy(&mut self) {
-        if self.known.len() > MANY {
+    /// Forgets if it is much, as one of so many `tiles`. It is found out again then: nothing depends on it but time.
+    pub fn tidy(&mut self, tiles: usize) {
+        let most = MEMORY / size_of::<Blocker>() / tiles.max(1);
+        if self.known.len() > MANY || self.blockers.len() > most {
             *self = Self::default();
         }
     }

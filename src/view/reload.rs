@@ -101,6 +101,8 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
     let mut again = match opened {
         Ok(opened) => opened.app,
         Err(error) => {
+            // What it did not come to has changed as well perhaps, and would ask for it again and again.
+            origin.options.files.refresh();
             origin.options.files.extend(&files);
             return Err(error.to_string());
         }

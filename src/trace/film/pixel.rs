@@ -65,13 +65,18 @@ impl Pixel {
         if !radiance.is_finite() {
             return false;
         }
-        let radiance = radiance.clamp(-Vec3::splat(Sum::MOST), Vec3::splat(Sum::MOST));
+        let radiance = Self::cut_off(radiance);
         let half = index as usize & 1;
         for (sum, sample) in self.sums[half].iter_mut().zip(radiance.to_array()) {
             sum.add(sample);
         }
         self.counts[half] += 1;
         true
+    }
+
+    /// What is added of a finite sample.
+    pub(super) fn cut_off(radiance: Vec3) -> Vec3 {
+        radiance.clamp(-Vec3::splat(Sum::MOST), Vec3::splat(Sum::MOST))
     }
 
     /// [`Pixel::add`] of many; returns how many were dropped.

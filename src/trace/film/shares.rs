@@ -83,8 +83,10 @@ impl Film {
     /// the share of one pixel is to be found from others.
     pub fn allot(&mut self, shares: &[f32]) {
         let even = self.complete_samples();
-        // After first shares some have more already, which nobody can tell apart: no others come then.
-        let missing = if self.keeps_early() { 0 } else { AGAIN.saturating_sub(even) };
+        // After first shares some have more already, which nobody can tell apart, and so have tiles that were refined before the
+        // others: no other shares come then.
+        let is_even = self.tiles.iter().all(|tile| tile.next_sample - self.first_sample == even);
+        let missing = if self.keeps_early() || !is_even { 0 } else { AGAIN.saturating_sub(even) };
         self.stage = Stage::Shares(even);
         self.give_shares(shares);
         for tile in &mut self.tiles {

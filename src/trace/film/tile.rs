@@ -73,7 +73,7 @@ impl Early {
         if let Some(missing) = self.missing.checked_sub(1) {
             self.missing = missing;
             if is_taken {
-                self.sums[index as usize & 1] += radiance;
+                self.sums[index as usize & 1] += Pixel::cut_off(radiance);
                 self.counts[index as usize & 1] += 1;
             }
         }
