@@ -36,6 +36,6 @@ version = "1"
 [workspace]
 TOML
 cd "$copy/kernels"
-# Our crate is built as it ships: no native instructions, its own profile's settings but for the harness's LTO.
+# All crates, ours too, get what the harness says: `target-cpu=native` and LTO. (Our kernels choose their instructions themselves in any case.)
 cargo build --release --quiet
 exec ./target/release/peer-kernels "$@"
