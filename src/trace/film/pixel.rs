@@ -62,16 +62,21 @@ impl Pixel {
     /// a worse error.
     #[inline]
     pub fn add(&mut self, index: u32, radiance: Vec3) -> bool {
-        if !radiance.is_finite() {
-            return false;
+        if !radiance.to_array().iter().all(|c| c.abs() <= Sum::MOST) {
+            return self.add_beyond(index, radiance);
         }
-        let radiance = Self::cut_off(radiance);
         let half = index as usize & 1;
         for (sum, sample) in self.sums[half].iter_mut().zip(radiance.to_array()) {
             sum.add(sample);
         }
         self.counts[half] += 1;
         true
+    }
+
+    /// [`Pixel::add`] of what hardly ever comes.
+    #[cold]
+    fn add_beyond(&mut self, index: u32, radiance: Vec3) -> bool {
+        radiance.is_finite() && self.add(index, Self::cut_off(radiance))
     }
 
     /// What is added of a finite sample.
