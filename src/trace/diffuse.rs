@@ -53,6 +53,14 @@ struct Arrived {
     placed: Option<u32>,
 }
 
+impl Arrived {
+    /// Equal for those of one placement who know the same.
+    fn company(&self) -> u64 {
+        let number = |of: Option<u32>| of.map_or(0, |of| u64::from(of) + 1);
+        number(self.placed) << 32 | number(self.known)
+    }
+}
+
 /// So many answers are at hand.
 const ASKED: usize = 64;
 
@@ -118,7 +126,7 @@ impl Batch {
         let mut flat = std::mem::take(&mut self.diffuse.flat);
         let mut other = std::mem::take(&mut self.diffuse.other);
         // What is in the way is asked once for all who know the same, and a placement is looked up once.
-        flat.sort_by_key(|arrived| (arrived.placed, arrived.known));
+        flat.sort_by_key(Arrived::company);
         for (points, is_flat) in [(&flat, true), (&other, false)] {
             for chunk in points.chunks(LANES) {
                 let like = self.path(chunk[0].path as usize).sampler;

@@ -121,7 +121,8 @@ fn in_the_way(
         if let Some(blockers) = known.and_then(|known| sightlines.blockers(known, light)) {
             let mut out = [0; LANES];
             if !blockers.is_empty() {
-                scene.geometry.tlas.isa().run(Reach { block, quad, blockers, out: &mut out });
+                let lanes = first..end;
+                scene.geometry.tlas.isa().run(Reach { block, lanes, quad, blockers, out: &mut out });
             }
             for (which, out) in which[first..end].iter_mut().zip(&out[first..end]) {
                 *which = Some(*out);

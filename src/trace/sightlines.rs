@@ -39,9 +39,9 @@ pub(super) struct Window {
 }
 
 /// More outlines in the way are too many.
-const FEW: usize = 16;
+const FEW: usize = 8;
 /// So many triangles are looked at, since together they may be few outlines.
-const LOOKED_AT: usize = 32;
+const LOOKED_AT: usize = 16;
 /// So many triangles in view are remembered.
 const MANY: usize = 32;
 

@@ -9,8 +9,9 @@
 use super::block::{Block, LANES};
 use super::blocker::{Blocker, EDGES};
 use super::quad::{Quad, angle_over_sine};
-use crate::bvh::simd::{Job, Simd};
+use crate::bvh::simd::{Job, Lanes, Mask, Simd, three};
 use glam::Vec3;
+use std::ops::Range;
 
 /// Most corners of a piece: four, and at most one more for each plane that cut it: two horizons and those of one blocker.
 const CORNERS: usize = 6 + EDGES;
@@ -53,81 +54,134 @@ pub fn irradiance(
         let all_above = quad.is_above(point, normal) && quad.is_above(point, geometric);
         if all_above { quad.irradiance(point, normal).abs() } else { piece.irradiance(normal).abs() }
     };
-    let mut planes = [[Vec3::ZERO; EDGES]; 2];
-    let mut cutting = (0..blockers.len()).filter(|&i| which >> i & 1 == 1);
-    let Some(first) = cutting.find(|&i| blockers[i].reaches(&piece, point, &mut planes[0])) else {
+    let mut cut = Cut::EMPTY;
+    let mut cutting = blockers.iter().zip(0..).filter(|(_, i)| which >> i & 1 == 1).map(|(blocker, _)| blocker);
+    if !cutting.any(|blocker| cut.put(blocker, &piece, point)) {
         return Some(whole());
-    };
-    let sum = if cutting.any(|i| blockers[i].reaches(&piece, point, &mut planes[1])) {
-        seen(piece, normal, point, blockers, which & (u32::MAX << first), &mut budget).abs()
+    }
+    let mut second = Cut::EMPTY;
+    let sum = if cutting.any(|blocker| second.put(blocker, &piece, point)) {
+        seen_past_all(&piece, normal, point, [cut, second], cutting, &mut budget)?.abs()
     } else {
         // Of the same formula: where all is hidden, nothing is left.
-        piece.irradiance(normal).abs() - hidden(piece, normal, &planes[0][..blockers[first].count])
+        piece.irradiance(normal).abs() - cut.hidden(piece, normal)
     };
     // Where blockers hide all of it by a hair, cutting leaves slivers of nothing but rounding.
     let is_dark = sum < FAINT && piece.count > 2 && sum <= ROUNDING * whole();
     (budget > 0).then_some(if is_dark { 0.0 } else { sum.max(0.0) })
 }
 
-/// From what of `piece` is inside of all of some planes.
-fn hidden(mut piece: Piece, normal: Vec3, planes: &[Vec3]) -> f32 {
-    for plane in planes {
-        if !piece.is_inside(*plane) {
-            piece = piece.inside(*plane);
-        }
-    }
-    piece.irradiance(normal).abs()
-}
-
-/// From what of `piece` is behind none of `blockers`.
-fn seen(
-    mut piece: Piece,
+/// From what of `piece` is behind neither those two nor any of `others`; `None` if they are too many.
+fn seen_past_all<'a>(
+    piece: &Piece,
     normal: Vec3,
     point: Vec3,
-    blockers: &[Blocker],
-    mut which: u32,
+    [first, second]: [Cut; 2],
+    others: impl Iterator<Item = &'a Blocker>,
     budget: &mut u32,
-) -> f32 {
+) -> Option<f32> {
+    let mut cuts = [Cut::EMPTY; MOST_CUTS];
+    (cuts[0], cuts[1]) = (first, second);
+    let mut count = 2;
+    for blocker in others {
+        if cuts.get_mut(count)?.put(blocker, piece, point) {
+            count += 1;
+        }
+    }
+    Some(seen(piece, normal, &cuts[..count], budget))
+}
+
+/// From what of `piece` is behind none of those that cut it.
+fn seen(piece: &Piece, normal: Vec3, cuts: &[Cut], budget: &mut u32) -> f32 {
     if piece.count < 3 || *budget == 0 {
         return 0.0;
     }
-    while which != 0 {
-        let blocker = &blockers[which.trailing_zeros() as usize];
-        which &= which - 1;
-        let mut planes = [Vec3::ZERO; EDGES];
-        // Outside of one of them is out of its reach: most are.
-        if !blocker.reaches(&piece, point, &mut planes) {
+    // Outside of one plane is out of its reach: most are.
+    let reaches = |cut: &Cut| !cut.planes().iter().any(|plane| piece.is_outside(*plane));
+    let Some(first) = cuts.iter().position(reaches) else { return piece.irradiance(normal) };
+    let mut left = *piece;
+    let mut sum = 0.0;
+    for plane in cuts[first].planes() {
+        if left.is_inside(*plane) {
             continue;
         }
-        let mut sum = 0.0;
-        for plane in &planes[..blocker.count] {
-            let (mut inside, mut outside) = (Piece::EMPTY, Piece::EMPTY);
-            piece.split(*plane, &mut inside, &mut outside);
-            if outside.count > 2 {
-                piece = inside;
-                *budget =
-                    budget.saturating_sub(if outside.is_full() || piece.is_full() { PIECES } else { 1 });
-                sum += seen(outside, normal, point, blockers, which, budget);
-                if piece.count < 3 {
-                    break;
-                }
-            }
+        let (mut inside, mut outside) = (Piece::EMPTY, Piece::EMPTY);
+        left.split(*plane, &mut inside, &mut outside);
+        *budget = budget.saturating_sub(if outside.is_full() || inside.is_full() { PIECES } else { 1 });
+        sum += seen(&outside, normal, &cuts[first + 1..], budget);
+        left = inside;
+        if left.count < 3 {
+            break;
         }
-        // What is inside of all of them is hidden.
-        return sum;
     }
-    piece.irradiance(normal)
+    // What is inside of all of them is hidden.
+    sum
 }
 
-/// Which of some blockers may hide some of a lamp from each point of a block.
+/// Blockers that cut a lamp as seen from one point: no more than that are dealt with.
+const MOST_CUTS: usize = 8;
+
+/// The planes through a point and a blocker's edges, by their inward normals.
+#[derive(Clone, Copy)]
+struct Cut {
+    planes: [Vec3; EDGES],
+    count: usize,
+}
+
+impl Cut {
+    const EMPTY: Self = Self { planes: [Vec3::ZERO; EDGES], count: 0 };
+
+    fn planes(&self) -> &[Vec3] {
+        &self.planes[..self.count]
+    }
+
+    /// Becomes that of `blocker` as seen from `point`. False if surely it hides nothing of `piece`: then it is none.
+    fn put(&mut self, blocker: &Blocker, piece: &Piece, point: Vec3) -> bool {
+        // Close to an edge the plane through it would be mostly rounding in single precision.
+        let point = point.as_dvec3();
+        let corners = blocker.corners();
+        let first = corners[0].as_dvec3() - point;
+        let mut here = first;
+        let side = if blocker.turned { 1.0 } else { blocker.side(point) };
+        // Seen edge-on.
+        if side == 0.0 {
+            return false;
+        }
+        let sign = side.signum();
+        self.count = corners.len();
+        for (i, plane) in self.planes[..corners.len()].iter_mut().enumerate() {
+            let next = corners.get(i + 1).map_or(first, |p| p.as_dvec3() - point);
+            *plane = (here.cross(next) * sign).as_vec3();
+            if piece.is_outside(*plane) {
+                return false;
+            }
+            here = next;
+        }
+        true
+    }
+
+    /// From what of `piece` is inside of all planes.
+    fn hidden(&self, mut piece: Piece, normal: Vec3) -> f32 {
+        for plane in self.planes() {
+            if !piece.is_inside(*plane) {
+                piece = piece.inside(*plane);
+            }
+        }
+        piece.irradiance(normal).abs()
+    }
+}
+
+/// Which of some blockers may hide some of a lamp from some points of a block.
 pub struct Reach<'a> {
     /// The points.
     pub block: &'a Block,
+    /// Which of them.
+    pub lanes: Range<usize>,
     /// The lamp.
     pub quad: &'a Quad,
     /// Fewer than 32.
     pub blockers: &'a [Blocker],
-    /// A bit for each of them; all are set where one hides all of it.
+    /// A bit for each of them, for each point of `lanes`; all are set where one hides all of it.
     pub out: &'a mut [u32; LANES],
 }
 
@@ -138,85 +192,129 @@ impl Job for Reach<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) {
-        let Self { block, quad, blockers, out } = self;
-        let lamp = quad.corners();
-        *out = [0; LANES];
-        for (number, blocker) in (0..u32::BITS).zip(blockers) {
-            let corners = blocker.corners();
-            let mut sign = [1.0; LANES];
-            if !blocker.turned {
-                for (i, sign) in sign.iter_mut().enumerate() {
-                    let point = block.position.get(i);
-                    let mut side = 0.0;
-                    for pair in corners.windows(2) {
-                        side += (corners[0] - point).cross(pair[0] - point).dot(pair[1] - point);
-                    }
-                    *sign = if side > 0.0 { 1.0 } else { -1.0 };
+    fn run<S: Simd>(self, simd: S) {
+        let Self { block, lanes, quad, blockers, out } = self;
+        for group in lanes.start / GROUP..lanes.end.div_ceil(GROUP) {
+            let found = &mut out[group * GROUP..][..GROUP];
+            found.fill(0);
+            let from = Outlook::new(simd, block, group * GROUP, quad);
+            for (number, blocker) in (0..u32::BITS).zip(blockers) {
+                let Sides { outside, inside } = from.sides(simd, blocker);
+                let mut touched = ALL & !outside;
+                while touched != 0 {
+                    let lane = touched.trailing_zeros();
+                    touched &= touched - 1;
+                    found[lane as usize] |= if inside >> lane & 1 == 1 { HIDDEN } else { 1 << number };
                 }
-            }
-            let (mut outside, mut inside) = ([false; LANES], [true; LANES]);
-            for (k, &corner) in corners.iter().enumerate() {
-                let next = corners[(k + 1) % corners.len()];
-                for i in 0..LANES {
-                    let point = block.position.get(i);
-                    let (a, b) = (corner - point, next - point);
-                    let lamp = [lamp[0] - point, lamp[1] - point, lamp[2] - point, lamp[3] - point];
-                    let far = size(lamp[0]) + size(lamp[2]);
-                    let (is_outside, is_inside) = sides(a.cross(b) * sign[i], size(a) * size(b) * far, &lamp);
-                    outside[i] |= is_outside;
-                    inside[i] &= is_inside;
-                }
-            }
-            for i in 0..LANES {
-                let bit = if outside[i] { 0 } else { 1 << number };
-                out[i] |= if inside[i] & !outside[i] { HIDDEN } else { bit };
             }
         }
     }
+}
+
+/// Points that are looked at together, and a bit for each.
+const GROUP: usize = 16;
+const ALL: u32 = (1 << GROUP) - 1;
+
+/// A lamp as seen from some points.
+struct Outlook<F> {
+    point: [F; 3],
+    /// Its corners, relative to them.
+    lamp: [[F; 3]; 4],
+    /// No less than the distance of any place on it.
+    far: F,
+}
+
+/// For which points all of a lamp is outside of a blocker's edge, and for which it is inside of all.
+struct Sides {
+    outside: u32,
+    inside: u32,
+}
+
+impl<F: Lanes> Outlook<F> {
+    #[inline(always)]
+    fn new<S: Simd<F16 = F>>(simd: S, block: &Block, first: usize, quad: &Quad) -> Self
+    where
+        F: Lanes<Proof = S>,
+    {
+        let point = three!(|axis| F::load(simd, &block.position.0[axis][first..]));
+        let [a, b, c, d] = quad.corners();
+        let a = minus(&corner(simd, a), &point);
+        let b = minus(&corner(simd, b), &point);
+        let c = minus(&corner(simd, c), &point);
+        let d = minus(&corner(simd, d), &point);
+        let far = size(&a) + size(&c);
+        Self { point, lamp: [a, b, c, d], far }
+    }
+
+    /// Sure whatever the rounding, which is in proportion to the lengths.
+    #[inline(always)]
+    fn sides<S: Simd<F16 = F>>(&self, simd: S, blocker: &Blocker) -> Sides
+    where
+        F: Lanes<Proof = S>,
+    {
+        let corners = blocker.corners();
+        let (zero, one) = (F::splat(simd, 0.0), F::splat(simd, 1.0));
+        let minus_one = F::splat(simd, -1.0);
+        let start = minus(&corner(simd, corners[0]), &self.point);
+        let mut sign = one;
+        if !blocker.turned {
+            let mut side = zero;
+            let mut before = start;
+            for &next in &corners[1..] {
+                let next = minus(&corner(simd, next), &self.point);
+                side = side + dot(&cross(&start, &before), &next);
+                before = next;
+            }
+            sign = F::select(zero.lt(side).bits(), one, minus_one);
+        }
+        let (mut outside, mut inside) = (0, ALL);
+        let (mut from, mut size_from) = (start, size(&start));
+        for k in 0..corners.len() {
+            let to = match corners.get(k + 1) {
+                Some(&next) => minus(&corner(simd, next), &self.point),
+                None => start,
+            };
+            let size_to = size(&to);
+            let plane = cross(&from, &to);
+            let plane = three!(|axis| plane[axis] * sign);
+            let margin = size_from * size_to * self.far * F::splat(simd, 1e-6);
+            let [a, b, c, d] = &self.lamp;
+            let (a, b, c, d) = (dot(&plane, a), dot(&plane, b), dot(&plane, c), dot(&plane, d));
+            outside |= a.max(b).max(c.max(d)).lt(zero - margin).bits();
+            inside &= margin.lt(a.min(b).min(c.min(d))).bits();
+            if outside == ALL {
+                break;
+            }
+            (from, size_from) = (to, size_to);
+        }
+        Sides { outside, inside }
+    }
+}
+
+#[inline(always)]
+fn corner<F: Lanes>(proof: F::Proof, p: Vec3) -> [F; 3] {
+    three!(|axis| F::splat(proof, p[axis]))
+}
+
+#[inline(always)]
+fn minus<F: Lanes>(a: &[F; 3], b: &[F; 3]) -> [F; 3] {
+    three!(|axis| a[axis] - b[axis])
+}
+
+#[inline(always)]
+fn dot<F: Lanes>(a: &[F; 3], b: &[F; 3]) -> F {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross<F: Lanes>(a: &[F; 3], b: &[F; 3]) -> [F; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Sum of the coordinates without sign: no less than the length, and sooner known.
 #[inline(always)]
-fn size(p: Vec3) -> f32 {
-    p.x.abs() + p.y.abs() + p.z.abs()
-}
-
-/// Whether all of a lamp is surely outside of a plane, and whether all is surely inside, whatever the rounding, which is in
-/// proportion to `scale`.
-#[inline(always)]
-fn sides(plane: Vec3, scale: f32, lamp: &[Vec3; 4]) -> (bool, bool) {
-    let margin = scale * 1e-6;
-    let (a, b, c, d) = (plane.dot(lamp[0]), plane.dot(lamp[1]), plane.dot(lamp[2]), plane.dot(lamp[3]));
-    let outside = (a < -margin) & (b < -margin) & (c < -margin) & (d < -margin);
-    (outside, (a > margin) & (b > margin) & (c > margin) & (d > margin))
-}
-
-impl Blocker {
-    /// Whether it may hide some of the piece. Then `planes` are the inward normals of those through `point` and its
-    /// edges.
-    fn reaches(&self, piece: &Piece, point: Vec3, planes: &mut [Vec3; EDGES]) -> bool {
-        // Close to an edge the plane through it would be mostly rounding in single precision.
-        let point = point.as_dvec3();
-        let corners = self.corners();
-        let first = corners[0].as_dvec3() - point;
-        let mut here = first;
-        let side = if self.turned { 1.0 } else { self.side(point) };
-        // Seen edge-on.
-        if side == 0.0 {
-            return false;
-        }
-        let sign = side.signum();
-        for (i, plane) in planes[..self.count].iter_mut().enumerate() {
-            let next = corners.get(i + 1).map_or(first, |p| p.as_dvec3() - point);
-            *plane = (here.cross(next) * sign).as_vec3();
-            if piece.is_outside(*plane) {
-                return false;
-            }
-            here = next;
-        }
-        true
-    }
+fn size<F: Lanes>(p: &[F; 3]) -> F {
+    p[0].abs() + p[1].abs() + p[2].abs()
 }
 
 impl Piece {

@@ -41,7 +41,7 @@ macro_rules! three {
         ]
     };
 }
-pub(super) use three;
+pub(crate) use three;
 
 /// An instruction set: its vector types, and (as a value) the proof that the machine has it.
 pub trait Simd: Copy {

@@ -97,8 +97,11 @@ impl Tile {
     /// What [`Tile::more`] is to be of a pixel when it has its share of `beyond` samples.
     #[must_use]
     pub(in crate::trace) fn goal(&self, pixel: usize, beyond: u32) -> u32 {
-        // Saturates; and sample indices end with u32.
-        ((f64::from(beyond) * f64::from(self.shares[pixel])).ceil() as u32).min(u32::MAX - self.next_sample)
+        // Rounded up (by hand: `ceil` is a call on old machines); saturates; and sample indices end with u32.
+        let share = f64::from(beyond) * f64::from(self.shares[pixel]);
+        let below = share as u32;
+        let goal = below.saturating_add(u32::from(f64::from(below) < share));
+        goal.min(u32::MAX - self.next_sample)
     }
 
     /// Index of the sample that comes next in a pixel: what is missing below it was dropped.
