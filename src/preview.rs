@@ -1,6 +1,6 @@
 //! A coarse whole picture, first of all, whenever the view has changed.
 
-use crate::trace::{Film, RayCounts, TraceScene, trace_pass};
+use crate::trace::{Film, RayCounts, RenderSettings, TraceScene, trace_pass};
 use bevy_ecs::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -60,7 +60,10 @@ impl Preview {
         };
         film.reset();
         let start = Instant::now();
-        let rays = trace_pass(scene, film, 1, 1, || true);
+        // For a single sample nobody asks what is in the way of all others.
+        let settings = RenderSettings { shafts: false, light_samples: 1, ..*scene.settings };
+        let scene = TraceScene { settings: &settings, ..*scene };
+        let rays = trace_pass(&scene, film, 1, 1, || true);
         self.note(start.elapsed(), f64::from(size.element_product()));
         Some(rays)
     }

@@ -2,6 +2,8 @@
 
 use super::compare::LinearImage;
 use super::tone_map::ToneMap;
+use crate::bvh::Isa;
+use crate::bvh::simd::{Job, Simd};
 use crate::scene::color::luminance;
 use crate::trace::Film;
 use crate::trace::sampler::{hash, unit_float};
@@ -105,8 +107,26 @@ fn develop_row(row: &[Vec4], y: u32, display: &Display, bytes: &mut [u8]) {
     let gain = display.exposure.exp2();
     match display.tone_map {
         // A function of its own, without curves.
-        ToneMap::Clip => develop_with(row, y, gain, |color| color, bytes),
-        map => develop_with(row, y, gain, |color| map.apply(color), bytes),
+        ToneMap::Clip => Isa::best().run(Developed { row, y, gain, map: |color| color, bytes }),
+        map => Isa::best().run(Developed { row, y, gain, map: |color| map.apply(color), bytes }),
+    }
+}
+
+/// A row, and what is to be done with its colours.
+struct Developed<'a, F> {
+    row: &'a [Vec4],
+    y: u32,
+    gain: f32,
+    map: F,
+    bytes: &'a mut [u8],
+}
+
+impl<F: Fn(Vec3) -> Vec3> Job for Developed<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        develop_with(self.row, self.y, self.gain, self.map, self.bytes);
     }
 }
 

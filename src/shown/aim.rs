@@ -13,7 +13,7 @@ const OTHERS: &[[f32; 2]] =
     &[[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]];
 
 /// Pixels that are looked up together: plain loops over so many are vectors to the compiler.
-pub const RUN: usize = 8;
+pub const RUN: usize = 16;
 
 /// The old picture, and the way into it.
 pub struct Old<'a> {
@@ -23,15 +23,17 @@ pub struct Old<'a> {
     pub spots: &'a [Spot],
 }
 
-/// A row of the new picture: rays as linear functions of x, in render space and in the old camera's own.
-pub struct Row {
-    /// Middle of it, pixels.
-    pub y: f32,
-    pub origin: [Vec3; 2],
-    pub direction: [Vec3; 2],
-    pub old_origin: [Vec3; 2],
-    pub old_direction: [Vec3; 2],
+/// Rays of the new picture as linear functions of the place, in render space and in the old camera's own: the value at
+/// (0, 0), and what each pixel across and down adds.
+pub struct Ways {
+    origin: [Vec3; 3],
+    direction: [Vec3; 3],
+    old_origin: [Vec3; 3],
+    old_direction: [Vec3; 3],
 }
+
+/// Middles of the pixels of a run, x and y. What is beyond it may be anything finite.
+pub type Middles = [[f32; RUN]; 2];
 
 /// Where the plane of a surface is for each pixel of a run, and where that was in the old picture.
 pub struct Aims {
@@ -44,7 +46,7 @@ pub struct Aims {
     /// ... and how far away.
     pub old_depth: [f32; RUN],
     /// Middles of the pixels.
-    pub middles: [[f32; RUN]; 2],
+    pub middles: Middles,
     /// The share of an old pixel that a new one shows, along one side, at most 1: one old pixel for many new ones says less
     /// about each.
     pub spread: [f32; RUN],
@@ -65,55 +67,51 @@ pub struct Finds {
     pub square: [f32; RUN],
 }
 
-impl Row {
-    pub fn new(new: &Sheet, old: &Sheet, y: f32) -> Self {
-        let at = |[start, across, down]: [Vec3; 3]| [start + down * y + across * 0.5, across];
-        let (origin, direction) = (at(new.origin), at(new.direction));
+impl Ways {
+    pub fn new(new: &Sheet, old: &Sheet) -> Self {
+        let ([start, across, down], direction) = (new.origin, new.direction);
         Self {
-            y,
-            origin,
+            origin: new.origin,
             direction,
-            old_origin: [old.own(origin[0]), old.axes * origin[1]],
+            old_origin: [old.own(start), old.axes * across, old.axes * down],
             old_direction: direction.map(|d| old.axes * d),
         }
     }
 
-    /// From pixel `first` on, for the plane of `place`, or for what is infinitely far.
+    /// For the plane of `place`, or for what is infinitely far.
     #[inline(always)]
-    pub fn aim(&self, new: &Sheet, old: &Sheet, first: u32, place: &Place) -> Aims {
+    pub fn aim(&self, new: &Sheet, old: &Sheet, middles: Middles, place: &Place) -> Aims {
         let nothing = place.thing == Place::NOTHING;
-        let ([o, o_across], [d, d_across]) = (self.origin, self.direction);
-        let (above, sinks) = (place.facet.dot(place.position - o), place.facet.dot(o_across));
-        let (falls, falls_across) = (place.facet.dot(d), place.facet.dot(d_across));
-        let [mut from, mut from_across] = self.old_origin;
-        let [to, to_across] = self.old_direction;
+        let [xs, ys] = &middles;
+        let (o, d) = (&self.origin, &self.direction);
+        let above = place.facet.dot(place.position - o[0]);
+        let [sinks_x, sinks_y] = [place.facet.dot(o[1]), place.facet.dot(o[2])];
+        let [falls, falls_x, falls_y] = [place.facet.dot(d[0]), place.facet.dot(d[1]), place.facet.dot(d[2])];
+        let mut from = &self.old_origin;
+        let to = &self.old_direction;
         if nothing {
-            (from, from_across) = (Vec3::ZERO, Vec3::ZERO);
-        }
-        let mut xs = [0.0; RUN];
-        for (i, x) in xs.iter_mut().enumerate() {
-            *x = first as f32 + i as f32;
+            from = &[Vec3::ZERO; 3];
         }
         let mut depth = [1.0; RUN];
         if !nothing {
             for i in 0..RUN {
-                depth[i] = (above - sinks * xs[i]) / (falls + falls_across * xs[i]);
+                let (x, y) = (xs[i], ys[i]);
+                depth[i] = (above - sinks_x * x - sinks_y * y) / (falls + falls_x * x + falls_y * y);
             }
         }
         let (mut points, mut own) = ([[0.0; RUN]; 3], [[0.0; RUN]; 3]);
         for axis in 0..3 {
             for i in 0..RUN {
-                let (x, t) = (xs[i], depth[i]);
-                points[axis][i] = o[axis] + o_across[axis] * x + (d[axis] + d_across[axis] * x) * t;
-                own[axis][i] = from[axis] + from_across[axis] * x + (to[axis] + to_across[axis] * x) * t;
+                let (x, y, t) = (xs[i], ys[i], depth[i]);
+                points[axis][i] = at_pixel(o, axis, x, y) + at_pixel(d, axis, x, y) * t;
+                own[axis][i] = at_pixel(from, axis, x, y) + at_pixel(to, axis, x, y) * t;
             }
         }
-        let [mut at, mut middles] = [[[0.0; RUN]; 2]; 2];
+        let mut at = [[0.0; RUN]; 2];
         let (mut spread, mut near, mut reach) = ([1.0; RUN], [1.0; RUN], [0.0; RUN]);
         for i in 0..RUN {
             let there = old.place(Vec3::new(own[0][i], own[1][i], own[2][i]));
             (at[0][i], at[1][i]) = (there.x, there.y);
-            (middles[0][i], middles[1][i]) = (xs[i] + 0.5, self.y);
             if !nothing {
                 let (pixel, old_pixel) = (new.pixel(depth[i]), old.pixel(own[2][i]));
                 spread[i] = (pixel / old_pixel).min(1.0);
@@ -143,7 +141,7 @@ impl Aims {
         self.look(&self.at, new, old, place, &mut finds);
         let (mut is_beside, mut is_lost) = (false, false);
         for i in 0..count {
-            is_beside |= finds.away[i] > self.near[i];
+            is_beside |= finds.away[i] > 1.25 * self.near[i];
             is_lost |= finds.away[i] == f32::INFINITY;
         }
         if is_beside && place.thing != Place::NOTHING {
@@ -171,14 +169,14 @@ impl Aims {
     #[inline(always)]
     fn look(&self, at: &[[f32; RUN]; 2], new: &Sheet, old: &Old, place: &Place, finds: &mut Finds) {
         let [width, height] = old.size.as_vec2().to_array();
-        let (mut index, mut is_it) = ([0; RUN], [false; RUN]);
+        let (mut index, mut is_it) = ([0_u32; RUN], [false; RUN]);
         for i in 0..RUN {
             let (x, y) = (at[0][i], at[1][i]);
             is_it[i] = (self.depth[i] > 0.0) & (self.old_depth[i] > 0.0) & (x >= 0.0) & (y >= 0.0);
             is_it[i] &= (x < width) & (y < height);
             // Somewhere in it, also if it is not a number.
             let (x, y) = (x.max(0.0).min(width - 1.0), y.max(0.0).min(height - 1.0));
-            index[i] = y as i32 * old.size.x as i32 + x as i32;
+            index[i] = whole(y) * old.size.x + whole(x);
         }
         let (mut points, mut words) = ([[0.0; RUN]; 3], [0_u32; RUN]);
         for i in 0..RUN {
@@ -199,7 +197,7 @@ impl Aims {
         }
         if place.thing == Place::NOTHING {
             for i in 0..RUN {
-                finds.index[i] = index[i] as u32;
+                finds.index[i] = index[i];
                 finds.away[i] = if is_it[i] { 0.0 } else { f32::INFINITY };
             }
             return;
@@ -213,13 +211,27 @@ impl Aims {
             let (x, y) = (place.x - self.middles[0][i], place.y - self.middles[1][i]);
             let square = x * x + y * y;
             let is_better = is_it[i] & (square < finds.square[i]);
-            finds.index[i] = if is_better { index[i] as u32 } else { finds.index[i] };
+            finds.index[i] = if is_better { index[i] } else { finds.index[i] };
             finds.away[i] = if is_better { x.abs().max(y.abs()) } else { finds.away[i] };
             finds.off[0][i] = if is_better { x } else { finds.off[0][i] };
             finds.off[1][i] = if is_better { y } else { finds.off[1][i] };
             finds.square[i] = if is_better { square } else { finds.square[i] };
         }
     }
+}
+
+/// The value of a linear function along one axis.
+#[inline(always)]
+fn at_pixel(of: &[Vec3; 3], axis: usize, x: f32, y: f32) -> f32 {
+    of[0][axis] + of[1][axis] * x + of[2][axis] * y
+}
+
+/// Without what is behind the point, from 0 to 2²² (where it ends in .0, that or one less): what the conversion of the language
+/// does beyond its range costs more than all of this.
+#[inline(always)]
+pub fn whole(x: f32) -> u32 {
+    // What is added has no digits behind the point, so that they are rounded off.
+    ((x - 0.5).max(0.0) + (1 << 23) as f32).to_bits() & 0x7f_ffff
 }
 
 #[cfg(test)]
@@ -238,8 +250,8 @@ mod tests {
         let mut spots = vec![Spot::UNKNOWN; 256];
         spots[(y * 16 + x) as usize] = Spot::from(&place);
         let old = Old { size, sheet, cells: &[Vec4::ONE; 256], spots: &spots };
-        let row = Row::new(&new, &old.sheet, 8.5);
-        let finds = row.aim(&new, &old.sheet, 8, &place).find(&new, &old, &place, 1);
+        let ways = Ways::new(&new, &old.sheet);
+        let finds = ways.aim(&new, &old.sheet, [[8.5; RUN]; 2], &place).find(&new, &old, &place, 1);
         (finds.index[0], finds.away[0])
     }
 

@@ -5,7 +5,7 @@
 //! step. After B. Walter, G. Drettakis, S. Parker, "Interactive Rendering using the Render Cache", 1999, which goes
 //! forward, and D. Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007.
 
-use super::aim::{Old, RUN, Row};
+use super::aim::{Middles, Old, RUN, Ways, whole};
 use super::grid::{Grid, note};
 use super::{MOST, Shown};
 use crate::bvh::simd::{Job, Simd};
@@ -41,14 +41,19 @@ impl Shown {
         self.kept.resize(count, Vec4::ZERO);
         self.spare.resize(count, Spot::UNKNOWN);
         let old = Old { size, sheet: before.sheet(size), cells: &self.cells, spots: &self.spots };
-        let width = size.x as usize;
-        let carried: usize = self
-            .kept
-            .par_chunks_exact_mut(width)
-            .zip(self.spare.par_chunks_exact_mut(width))
-            .zip(0..size.y)
-            .map(|((kept, found), y)| carry_row(scene, &new, &old, &grid, y, kept, found))
-            .sum();
+        let (mut kept, mut found) = (&mut *self.kept, &mut *self.spare);
+        let mut bands = Vec::with_capacity(grid.size.y as usize);
+        for v in 0..grid.size.y {
+            let rows = grid.rows(v, size.y);
+            let pixels = rows.len() * size.x as usize;
+            let (own_kept, other_kept) = kept.split_at_mut(pixels);
+            let (own_found, other_found) = found.split_at_mut(pixels);
+            (kept, found) = (other_kept, other_found);
+            bands.push(Band { v, rows, kept: own_kept, found: own_found });
+        }
+        let ways = Ways::new(&new, &old.sheet);
+        let carry = Carry { scene, new: &new, old: &old, grid: &grid, ways: &ways };
+        let carried: usize = bands.into_par_iter().map(|band| carry.band(band)).sum();
         self.share = carried as f64 / count as f64;
         std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
@@ -57,117 +62,182 @@ impl Shown {
     }
 }
 
-/// Fills in row `y`; returns how many pixels have old samples.
-fn carry_row(
-    scene: &TraceScene,
-    new: &Sheet,
-    old: &Old,
-    grid: &Grid<'_>,
-    y: u32,
-    kept: &mut [Vec4],
-    found: &mut [Spot],
-) -> usize {
-    let row = Row::new(new, &old.sheet, y as f32 + 0.5);
-    let v = y * grid.size.y / old.size.y;
-    let span = |u: u32| grid.span(u, old.size.x);
-    let mut exact = Vec::new();
-    if let Some(step) = grid.step {
-        let edges = (0..grid.size.x).filter(|&u| grid.at(u, v).edge);
-        let starts = edges.flat_map(|u| span(u).step_by(step as usize));
-        let half = 0.5 * step as f32;
-        let middles: Vec<Vec2> = starts.map(|x| Vec2::new(x as f32 + half, y as f32 + 0.5)).collect();
-        exact.resize(middles.len(), Place::unknown());
-        places(scene, &middles, &mut exact);
-    }
-    let mut exact = exact.into_iter();
-    let mut runs: Vec<Run> = Vec::with_capacity(grid.size.x as usize);
-    for u in 0..grid.size.x {
-        let block = grid.at(u, v);
-        let stride = grid.step.filter(|_| block.edge).unwrap_or(RUN as u32);
-        for x in span(u).step_by(stride as usize) {
-            let place = if block.edge { exact.next().unwrap_or(*block) } else { *block };
-            let end = (x + stride).min(span(u).end);
-            match runs.last_mut() {
-                Some(last) if block.edge && last.takes(&place, end, new) => last.pixels.end = end,
-                _ => runs.push(Run { place, edge: block.edge, pixels: x..end }),
-            }
-        }
-    }
-    scene.geometry.tlas.isa().run(CarryRow { new, old, grid, row, y, runs, kept, found })
-}
-
-/// Pixels side by side that show one plane; [`RUN`] at most.
-struct Run {
-    place: Place,
-    /// Whether they may see an edge.
-    edge: bool,
-    pixels: Range<u32>,
-}
-
-impl Run {
-    /// Whether what is at `place` up to pixel `end` is a part of it.
-    fn takes(&self, place: &Place, end: u32, new: &Sheet) -> bool {
-        let off = self.place.facet.dot(place.position - self.place.position);
-        self.edge
-            && end - self.pixels.start <= RUN as u32
-            && self.place.thing == place.thing
-            && self.place.facet == place.facet
-            && off.abs() <= 0.1 * new.pixel(new.own(place.position).z)
-    }
-}
-
-struct CarryRow<'a> {
-    new: &'a Sheet,
-    old: &'a Old<'a>,
-    grid: &'a Grid<'a>,
-    row: Row,
-    y: u32,
-    runs: Vec<Run>,
+/// A row of blocks of the new picture.
+struct Band<'a> {
+    v: u32,
+    rows: Range<u32>,
+    /// All pixels of `rows`.
     kept: &'a mut [Vec4],
     found: &'a mut [Spot],
 }
 
-impl Job for CarryRow<'_> {
+/// Pixels that show one plane; [`RUN`] at most.
+struct Run {
+    place: Place,
+    /// Whether they may see an edge.
+    edge: bool,
+    columns: Range<u32>,
+    rows: Range<u32>,
+}
+
+impl Run {
+    /// Whether what is at `place` up to column `end` is a part of it.
+    fn takes(&self, place: &Place, end: u32, new: &Sheet) -> bool {
+        let off = self.place.facet.dot(place.position - self.place.position);
+        end - self.columns.start <= RUN as u32
+            && self.place.thing == place.thing
+            && self.place.facet == place.facet
+            && off.abs() <= 0.1 * new.pixel(new.own(place.position).z)
+    }
+
+    /// The middles of its pixels, row by row.
+    #[inline(always)]
+    fn middles(&self) -> Middles {
+        let (left, top) = (self.columns.start as f32 + 0.5, self.rows.start as f32 + 0.5);
+        let width = self.columns.len() as f32;
+        let per_pixel = 1.0 / width;
+        let mut middles = [[0.0; RUN]; 2];
+        for i in 0..RUN {
+            let along = i as f32;
+            let row = whole((along + 0.5) * per_pixel) as f32;
+            middles[0][i] = left + (along - row * width);
+            middles[1][i] = top + row;
+        }
+        middles
+    }
+}
+
+/// All that one needs to know of both pictures.
+#[derive(Clone, Copy)]
+struct Carry<'a> {
+    scene: &'a TraceScene<'a>,
+    new: &'a Sheet,
+    old: &'a Old<'a>,
+    grid: &'a Grid<'a>,
+    ways: &'a Ways,
+}
+
+impl Carry<'_> {
+    /// Fills in a band; returns how many pixels have old samples.
+    fn band(&self, band: Band<'_>) -> usize {
+        let runs = self.runs(band.v, &band.rows);
+        self.scene.geometry.tlas.isa().run(CarryBand { carry: *self, runs, band })
+    }
+
+    /// The runs of a band.
+    fn runs(&self, v: u32, rows: &Range<u32>) -> Vec<Run> {
+        let grid = self.grid;
+        let span = |u: u32| grid.span(u, self.old.size.x);
+        let mut runs: Vec<Run> = Vec::with_capacity((grid.size.x * rows.len() as u32) as usize);
+        // Blocks of one plane, some rows at once; from left to right, which memory is made for.
+        let whole = |u: u32| grid.step.is_none() || !grid.at(u, v).edge;
+        let together = (RUN as u32 * grid.size.x / self.old.size.x).clamp(1, RUN as u32);
+        for rows in parts(rows.clone(), together) {
+            for u in (0..grid.size.x).filter(|&u| whole(u)) {
+                let block = grid.at(u, v);
+                for columns in parts(span(u), RUN as u32 / rows.len() as u32) {
+                    runs.push(Run { place: *block, edge: block.edge, columns, rows: rows.clone() });
+                }
+            }
+        }
+        let Some(step) = grid.step else { return runs };
+        // Block by block, so that rays which are traced together stay together.
+        let edges: Vec<u32> = (0..grid.size.x).filter(|&u| !whole(u)).collect();
+        let half = 0.5 * step as f32;
+        let middles: Vec<Vec2> = edges
+            .iter()
+            .flat_map(|&u| rows.clone().flat_map(move |y| span(u).step_by(step as usize).map(move |x| (x, y))))
+            .map(|(x, y)| Vec2::new(x as f32 + half, y as f32 + 0.5))
+            .collect();
+        let mut exact = vec![Place::unknown(); middles.len()];
+        places(self.scene, &middles, &mut exact);
+        let mut first = 0;
+        let mut along: Vec<Vec<Run>> = rows.clone().map(|_| Vec::new()).collect();
+        for u in edges {
+            for (y, along) in rows.clone().zip(&mut along) {
+                for columns in parts(span(u), step) {
+                    let place = exact[first];
+                    first += 1;
+                    match along.last_mut() {
+                        Some(last)
+                            if last.columns.end == columns.start
+                                && last.takes(&place, columns.end, self.new) =>
+                        {
+                            last.columns.end = columns.end;
+                        }
+                        _ => along.push(Run { place, edge: true, columns, rows: y..y + 1 }),
+                    }
+                }
+            }
+        }
+        runs.extend(along.into_iter().flatten());
+        runs
+    }
+}
+
+/// A range in parts of `length`; the last may be shorter.
+fn parts(whole: Range<u32>, length: u32) -> impl Iterator<Item = Range<u32>> {
+    let end = whole.end;
+    whole.step_by(length.max(1) as usize).map(move |start| start..(start + length.max(1)).min(end))
+}
+
+struct CarryBand<'a> {
+    carry: Carry<'a>,
+    runs: Vec<Run>,
+    band: Band<'a>,
+}
+
+impl Job for CarryBand<'_> {
     type Output = usize;
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> usize {
-        let Self { new, old, grid, row, y, runs, kept, found } = self;
+        let Carry { new, old, grid, ways, .. } = self.carry;
+        let Band { rows: band, kept, found, .. } = self.band;
         let mut carried = 0;
-        for Run { place, edge, pixels } in runs {
+        for run in self.runs {
+            let Run { place, edge, ref columns, ref rows } = run;
             let surface = Spot::from(&Place { edge: false, ..place });
-            let aims = row.aim(new, &old.sheet, pixels.start, &place);
-            let finds = aims.find(new, old, &place, pixels.len());
-            for (i, x) in pixels.enumerate() {
-                let (kept, found) = (&mut kept[x as usize], &mut found[x as usize]);
-                let there = &old.spots[finds.index[i] as usize];
-                let cell = old.cells[finds.index[i] as usize];
-                let keeps = f32::from(place.keeps.min(there.keeps));
-                let weight = cell.w.min(MOST).min(keeps) * aims.spread[i] * aims.spread[i];
-                // Beside an edge it may be of the next pixel.
-                if finds.away[i] <= 2.0 * aims.near[i] && weight > LEAST {
-                    // At an edge the preview may be of another surface; beside many old samples it says nothing.
-                    *kept = if edge || grid.worth < NOTABLE * weight {
-                        cell.truncate().extend(weight)
+            let aims = ways.aim(new, &old.sheet, run.middles(), &place);
+            let finds = aims.find(new, old, &place, columns.len() * rows.len());
+            let mut i = 0;
+            for y in rows.clone() {
+                let first = ((y - band.start) * old.size.x) as usize;
+                let pixels = first + columns.start as usize..first + columns.end as usize;
+                let pixels = kept[pixels.clone()].iter_mut().zip(&mut found[pixels]);
+                for (x, (kept, found)) in columns.clone().zip(pixels) {
+                    let there = &old.spots[finds.index[i % RUN] as usize];
+                    let cell = old.cells[finds.index[i % RUN] as usize];
+                    let keeps = f32::from(place.keeps.min(there.keeps));
+                    let spread = aims.spread[i % RUN];
+                    let weight = cell.w.min(MOST).min(keeps) * spread * spread;
+                    let (away, near) = (finds.away[i % RUN], aims.near[i % RUN]);
+                    // Beside an edge it may be of the next pixel.
+                    if away <= 2.0 * near && weight > LEAST {
+                        // At an edge the preview may be of another surface; beside many old samples it says nothing.
+                        *kept = if edge || grid.worth < NOTABLE * weight {
+                            cell.truncate().extend(weight)
+                        } else {
+                            let preview = grid.own_color([x, y], old.size);
+                            let sum = weight + grid.worth;
+                            let radiance = (cell.truncate() * weight + preview * grid.worth) / sum;
+                            radiance.extend(sum.min(MOST))
+                        };
+                        *found = *there;
+                        if away > near {
+                            found.position = aims.point(i % RUN);
+                        }
+                        carried += 1;
                     } else {
-                        let preview = grid.own_color([x, y], old.size);
-                        let sum = weight + grid.worth;
-                        let radiance = (cell.truncate() * weight + preview * grid.worth) / sum;
-                        radiance.extend(sum.min(MOST))
-                    };
-                    *found = *there;
-                    if finds.away[i] > aims.near[i] {
-                        found.position = aims.point(i);
+                        let depth = aims.depth[i % RUN];
+                        let is_there = depth > 0.0 && depth.is_finite() && place.thing != Place::NOTHING;
+                        let (position, depth) =
+                            if is_there { (aims.point(i % RUN), depth) } else { (place.position, 1.0) };
+                        let color = grid.color([x, y], old.size, &place, new.pixel(depth));
+                        *kept = color.extend(grid.worth);
+                        *found = Spot { position, ..surface };
                     }
-                    carried += 1;
-                } else {
-                    let depth = aims.depth[i];
-                    let is_there = depth > 0.0 && depth.is_finite() && place.thing != Place::NOTHING;
-                    let (position, depth) =
-                        if is_there { (aims.point(i), depth) } else { (place.position, 1.0) };
-                    let color = grid.color([x, y], old.size, &place, new.pixel(depth));
-                    *kept = color.extend(grid.worth);
-                    *found = Spot { position, ..surface };
+                    i += 1;
                 }
             }
         }

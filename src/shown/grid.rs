@@ -113,6 +113,11 @@ impl<'a> Grid<'a> {
         (u * width).div_ceil(self.size.x)..((u + 1) * width).div_ceil(self.size.x)
     }
 
+    /// Rows of pixels of block row `v` of a picture of so many rows.
+    pub fn rows(&self, v: u32, height: u32) -> Range<u32> {
+        (v * height).div_ceil(self.size.y)..((v + 1) * height).div_ceil(self.size.y)
+    }
+
     pub fn at(&self, x: u32, y: u32) -> &Place {
         &self.blocks[(y * self.size.x + x) as usize]
     }

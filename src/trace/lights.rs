@@ -81,6 +81,8 @@ pub const KNOWN_LIGHTS: usize = 32;
 const EVENLY: f32 = 0.25;
 /// Up to this many solid lights are not worth a hierarchy.
 const FEW_SHAPES: usize = 4;
+/// Of more solid shapes nobody asks whether one is in view.
+const ASKED_ABOUT: usize = 256;
 
 impl Lights {
     /// `meshes` names the light of each emissive (instance, slot). What is as it was `before` is not made again.
@@ -242,10 +244,11 @@ impl Lights {
         })
     }
 
-    /// Whether one of the boxes around solid shapes is such a one.
+    /// Whether one of the boxes around solid shapes is such a one; if they are very many, that is taken for granted.
     #[must_use]
     pub fn any_shape(&self, is: impl Fn(Aabb) -> bool) -> bool {
-        self.seen.lights.iter().any(|&light| match self.get(light) {
+        // To ask about thousands would cost more than what is known then is worth.
+        self.seen.lights.len() > ASKED_ABOUT || self.seen.lights.iter().any(|&light| match self.get(light) {
             FlatLight::Shape(shape) => is(shape.shape.bounds()),
             _ => false,
         })

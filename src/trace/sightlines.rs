@@ -51,7 +51,11 @@ const MEMORY: usize = 1 << 30;
 impl Window {
     /// Of a tile of a picture of `size`.
     pub fn new(scene: &TraceScene, tile: &Tile, size: UVec2) -> Self {
-        let (low, high) = (tile.origin.as_vec2(), (tile.origin + tile.size).as_vec2());
+        Self::around(scene, tile.origin.as_vec2(), (tile.origin + tile.size).as_vec2(), size)
+    }
+
+    /// Of a rectangle of a picture of `size`, pixels.
+    pub fn around(scene: &TraceScene, low: Vec2, high: Vec2, size: UVec2) -> Self {
         let ray = |x: f32, y: f32| scene.viewpoint.ray(Vec2::new(x, y), size);
         Self { corners: [ray(low.x, low.y), ray(high.x, low.y), ray(high.x, high.y), ray(low.x, high.y)] }
     }

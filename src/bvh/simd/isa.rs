@@ -4,6 +4,7 @@ use super::portable::{Narrow, Plain};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
 use super::{Part, Simd};
+use std::sync::LazyLock;
 
 /// A set of instructions that this machine is known to have.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +60,13 @@ impl Isa {
     #[must_use]
     pub fn detect() -> Self {
         *Self::available().last().unwrap_or(&Self::SCALAR)
+    }
+
+    /// The same, found out once.
+    #[must_use]
+    pub fn best() -> Self {
+        static BEST: LazyLock<Isa> = LazyLock::new(Isa::detect);
+        *BEST
     }
 
     /// All that this machine has, narrowest first.
