@@ -1,6 +1,6 @@
 //! A coarse whole picture, first of all, whenever the view has changed.
 
-use crate::trace::{Film, RayCounts, RenderSettings, TraceScene, trace_pass};
+use crate::trace::{Film, RayCounts, TraceScene, trace_pass};
 use bevy_ecs::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -25,7 +25,7 @@ const ANSWER: f64 = 0.029;
 /// ... but this in any case.
 const LEAST: f64 = 0.006;
 /// Of [`Preview::target`], what is left to the preview in any case.
-const OWN: f64 = 0.35;
+const OWN: f64 = 0.2;
 /// A finer step is taken only if it is expected to need less than this part of [`Preview::target`]: without the
 /// gap two steps would alternate.
 const HEADROOM: f64 = 0.7;
@@ -60,8 +60,7 @@ impl Preview {
         };
         film.reset();
         let start = Instant::now();
-        // For a single sample nobody asks what is in the way of all others.
-        let settings = RenderSettings { shafts: false, light_samples: 1, ..*scene.settings };
+        let settings = scene.settings.for_single_samples();
         let scene = TraceScene { settings: &settings, ..*scene };
         let rays = trace_pass(&scene, film, 1, 1, || true);
         self.note(start.elapsed(), f64::from(size.element_product()));

@@ -12,15 +12,21 @@ use crate::bvh::simd::{Job, Simd};
 use crate::trace::camera::Sheet;
 use crate::trace::place::{Place, Spot, places};
 use crate::trace::{Film, TraceScene};
-use glam::{Vec2, Vec4};
+use glam::{UVec2, Vec2, Vec4};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Instant;
 
 /// A preview that counts less than this share of the old samples is left out.
 const NOTABLE: f32 = 0.02;
+/// Pixels with fewer old samples are among the first to get new ones.
+const POOR: f32 = 3.0;
+/// One of so many is told of: they may be all of the picture.
+const SPARSE: u32 = 16;
+/// Of the time for carrying over, what new samples may take beside it.
+const FILLING: f64 = 0.2;
 /// Old pixels that are worth less are left alone, samples.
-const LEAST: f32 = 1e-3;
+const LEAST: f32 = 0.02;
 
 impl Shown {
     /// Makes `kept` and `spots` those of `scene`'s viewpoint, in about so many seconds.
@@ -52,14 +58,29 @@ impl Shown {
             bands.push(Band { v, rows, kept: own_kept, found: own_found });
         }
         let ways = Ways::new(&new, &old.sheet);
-        let carry = Carry { scene, new: &new, old: &old, grid: &grid, ways: &ways };
-        let carried: usize = bands.into_par_iter().map(|band| carry.band(band)).sum();
-        self.share = carried as f64 / count as f64;
+        let phase = self.fills % SPARSE;
+        let carry = Carry { scene, new: &new, old: &old, grid: &grid, ways: &ways, phase };
+        let lost: Vec<_> = bands.into_par_iter().map(|band| carry.band(band)).collect();
+        let missing: usize = lost.iter().map(|lost| lost.missing.len()).sum();
+        self.share = (count - missing) as f64 / count as f64;
         std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
         let looked = grid.exact * self.pace.place.unwrap_or(0.0);
         note(&mut self.pace.pixel, (start.elapsed().as_secs_f64() - looked).max(0.0), count);
+        // Without a preview the film itself has one of each pixel.
+        if preview.is_some() {
+            self.fill(scene, &lost, FILLING * seconds);
+        }
     }
+}
+
+/// Pixels of which too little was known.
+#[derive(Default)]
+pub(super) struct Lost {
+    /// Those without old samples.
+    pub missing: Vec<UVec2>,
+    /// Those with few.
+    pub poor: Vec<UVec2>,
 }
 
 /// A row of blocks of the new picture.
@@ -96,14 +117,13 @@ impl Run {
         let (left, top) = (self.columns.start as f32 + 0.5, self.rows.start as f32 + 0.5);
         let width = self.columns.len() as f32;
         let per_pixel = 1.0 / width;
-        let mut middles = [[0.0; RUN]; 2];
-        for i in 0..RUN {
+        let (mut xs, mut ys) = ([0.0; RUN], [0.0; RUN]);
+        for (i, (x, y)) in xs.iter_mut().zip(&mut ys).enumerate() {
             let along = i as f32;
             let row = whole((along + 0.5) * per_pixel) as f32;
-            middles[0][i] = left + (along - row * width);
-            middles[1][i] = top + row;
+            (*x, *y) = (left + (along - row * width), top + row);
         }
-        middles
+        [xs, ys]
     }
 }
 
@@ -115,11 +135,13 @@ struct Carry<'a> {
     old: &'a Old<'a>,
     grid: &'a Grid<'a>,
     ways: &'a Ways,
+    /// Which of [`SPARSE`] pixels side by side may be poor.
+    phase: u32,
 }
 
 impl Carry<'_> {
-    /// Fills in a band; returns how many pixels have old samples.
-    fn band(&self, band: Band<'_>) -> usize {
+    /// Fills in a band.
+    fn band(&self, band: Band<'_>) -> Lost {
         let runs = self.runs(band.v, &band.rows);
         self.scene.geometry.tlas.isa().run(CarryBand { carry: *self, runs, band })
     }
@@ -146,33 +168,84 @@ impl Carry<'_> {
         let half = 0.5 * step as f32;
         let middles: Vec<Vec2> = edges
             .iter()
-            .flat_map(|&u| rows.clone().flat_map(move |y| span(u).step_by(step as usize).map(move |x| (x, y))))
+            .flat_map(|&u| {
+                rows.clone().flat_map(move |y| span(u).step_by(step as usize).map(move |x| (x, y)))
+            })
             .map(|(x, y)| Vec2::new(x as f32 + half, y as f32 + 0.5))
             .collect();
         let mut exact = vec![Place::unknown(); middles.len()];
         places(self.scene, &middles, &mut exact);
-        let mut first = 0;
-        let mut along: Vec<Vec<Run>> = rows.clone().map(|_| Vec::new()).collect();
+        let mut exact = exact.into_iter();
+        let mut along: Vec<Vec<Knot>> = rows.clone().map(|_| Vec::new()).collect();
         for u in edges {
-            for (y, along) in rows.clone().zip(&mut along) {
-                for columns in parts(span(u), step) {
-                    let place = exact[first];
-                    first += 1;
-                    match along.last_mut() {
-                        Some(last)
-                            if last.columns.end == columns.start
-                                && last.takes(&place, columns.end, self.new) =>
-                        {
-                            last.columns.end = columns.end;
-                        }
-                        _ => along.push(Run { place, edge: true, columns, rows: y..y + 1 }),
+            for knots in &mut along {
+                let columns = parts(span(u), step);
+                knots.extend(columns.zip(&mut exact).map(|(columns, place)| {
+                    let x = columns.start as f32 + half;
+                    Knot { x, columns, place }
+                }));
+            }
+        }
+        let mut gap = step as f32;
+        while gap > 1.0 {
+            self.bisect(rows, &mut along, gap);
+            gap *= 0.5;
+        }
+        for (y, knots) in rows.clone().zip(along) {
+            let first = runs.len();
+            for Knot { columns, place, .. } in knots.into_iter().filter(|knot| !knot.columns.is_empty()) {
+                match runs[first..].last_mut() {
+                    Some(last)
+                        if last.columns.end == columns.start && last.takes(&place, columns.end, self.new) =>
+                    {
+                        last.columns.end = columns.end;
                     }
+                    _ => runs.push(Run { place, edge: true, columns, rows: y..y + 1 }),
                 }
             }
         }
-        runs.extend(along.into_iter().flatten());
         runs
     }
+
+    /// Looks between any two knots so far apart, side by side, that show different surfaces.
+    fn bisect(&self, rows: &Range<u32>, along: &mut [Vec<Knot>], gap: f32) {
+        let mut between = Vec::new();
+        for (row, knots) in along.iter().enumerate() {
+            for (i, pair) in knots.windows(2).enumerate() {
+                let [a, b] = pair else { continue };
+                let differs = || {
+                    let pixel = self.new.pixel(self.new.own(a.place.position).z.max(0.0));
+                    !a.place.continues(&b.place, pixel)
+                };
+                if a.columns.end == b.columns.start && b.x - a.x == gap && differs() {
+                    between.push((
+                        row,
+                        i,
+                        Vec2::new(0.5 * (a.x + b.x), (rows.start + row as u32) as f32 + 0.5),
+                    ));
+                }
+            }
+        }
+        let middles: Vec<Vec2> = between.iter().map(|(.., at)| *at).collect();
+        let mut found = vec![Place::unknown(); middles.len()];
+        places(self.scene, &middles, &mut found);
+        // From right to left, so that what is not yet done stays where it is.
+        for ((row, i, at), place) in between.into_iter().zip(found).rev() {
+            let knots = &mut along[row];
+            let start = (at.x - 0.25 * gap - 0.5).ceil() as u32;
+            let end = (at.x + 0.25 * gap - 0.5).ceil() as u32;
+            knots[i].columns.end = start;
+            knots[i + 1].columns.start = end;
+            knots.insert(i + 1, Knot { x: at.x, columns: start..end, place });
+        }
+    }
+}
+
+/// A look along a row, and the pixels that it stands for.
+struct Knot {
+    x: f32,
+    columns: Range<u32>,
+    place: Place,
 }
 
 /// A range in parts of `length`; the last may be shorter.
@@ -188,13 +261,13 @@ struct CarryBand<'a> {
 }
 
 impl Job for CarryBand<'_> {
-    type Output = usize;
+    type Output = Lost;
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> usize {
+    fn run<S: Simd>(self, _: S) -> Lost {
         let Carry { new, old, grid, ways, .. } = self.carry;
         let Band { rows: band, kept, found, .. } = self.band;
-        let mut carried = 0;
+        let (mut lost, phase) = (Lost::default(), self.carry.phase);
         for run in self.runs {
             let Run { place, edge, ref columns, ref rows } = run;
             let surface = Spot::from(&Place { edge: false, ..place });
@@ -227,7 +300,9 @@ impl Job for CarryBand<'_> {
                         if away > near {
                             found.position = aims.point(i % RUN);
                         }
-                        carried += 1;
+                        if kept.w < POOR && (x + 5 * y) % SPARSE == phase {
+                            lost.poor.push(UVec2::new(x, y));
+                        }
                     } else {
                         let depth = aims.depth[i % RUN];
                         let is_there = depth > 0.0 && depth.is_finite() && place.thing != Place::NOTHING;
@@ -236,11 +311,12 @@ impl Job for CarryBand<'_> {
                         let color = grid.color([x, y], old.size, &place, new.pixel(depth));
                         *kept = color.extend(grid.worth);
                         *found = Spot { position, ..surface };
+                        lost.missing.push(UVec2::new(x, y));
                     }
                     i += 1;
                 }
             }
         }
-        carried
+        lost
     }
 }

@@ -13,8 +13,9 @@ use std::time::Instant;
 const SIDES: [u32; 3] = [2, 4, 8];
 /// Of the time for carrying over, what looking may take before one knows where the edges are.
 const FIRST_LOOK: f64 = 0.6;
-/// Pixels along a row for which one looks once where there are edges, as there is time, ...
-const STEPS: [u32; 3] = [1, 2, 4];
+/// Pixels along a row for which one looks once where there are edges, as there is time, and how many looks that makes for each
+/// when it is looked again between different ones; ...
+const STEPS: [(u32, f64); 4] = [(1, 1.0), (2, 1.2), (4, 1.4), (8, 2.0)];
 /// ... or somewhat less, as a share of the time for carrying over: without, thin things fall apart.
 const OVERTIME: f64 = 0.25;
 
@@ -25,6 +26,8 @@ pub struct Pace {
     pub place: Option<f64>,
     /// Seconds for one pixel, apart from that.
     pub pixel: Option<f64>,
+    /// Seconds for a sample of a pixel that lacks one.
+    pub sample: Option<f64>,
 }
 
 /// Before anything was measured: seconds for a pixel or a place.
@@ -84,11 +87,11 @@ impl<'a> Grid<'a> {
             for (x, edge) in edges.iter_mut().enumerate() {
                 let here = &blocks[y * width + x];
                 let pixel = sheet.pixel(sheet.own(here.position).z.max(0.0));
-                let rows = y.saturating_sub(1)..(y + 2).min(size.y as usize);
-                let columns = x.saturating_sub(1)..(x + 2).min(width);
-                *edge = rows.into_iter().any(|y| {
-                    blocks[y * width..][columns.clone()].iter().any(|other| !here.continues(other, pixel))
-                });
+                let differs = |x: usize, y: usize| !here.continues(&blocks[y * width + x], pixel);
+                *edge = x > 0 && differs(x - 1, y)
+                    || x + 1 < width && differs(x + 1, y)
+                    || y > 0 && differs(x, y - 1)
+                    || y + 1 < size.y as usize && differs(x, y + 1);
             }
         });
         let count = edges.iter().filter(|&&edge| edge).count();
@@ -99,13 +102,13 @@ impl<'a> Grid<'a> {
             preview.map_or(0.0, |film| film.size().element_product() as f32 / full.element_product() as f32);
         let at_edges = count as f64 * pixels / blocks.len() as f64;
         let place = pace.place.unwrap_or(FIRST_GUESS);
-        let looks = |step: u32| at_edges / f64::from(step);
+        let looks = |(step, again): (u32, f64)| at_edges / f64::from(step) * again;
         let [.., coarsest] = STEPS;
-        let fits = |step: u32, left: f64| (looks(step) * place <= left).then_some(step);
+        let fits = |step: (u32, f64), left: f64| (looks(step) * place <= left).then_some(step);
         let step = STEPS.into_iter().find_map(|step| fits(step, left));
         let step = step.or(fits(coarsest, left.max(0.0) + OVERTIME * seconds));
         let exact = step.map_or(0.0, looks);
-        Self { size, step, exact, blocks, preview, worth }
+        Self { size, step: step.map(|(step, _)| step), exact, blocks, preview, worth }
     }
 
     /// Pixels of block column `u` of a row of `width`.

@@ -7,6 +7,7 @@
 
 mod aim;
 mod carry;
+mod fill;
 mod grid;
 mod smooth;
 
@@ -75,6 +76,8 @@ pub struct Shown {
     pub seconds: [f64; 2],
     /// How much one can look at in time.
     pace: grid::Pace,
+    /// How often pixels that lacked samples got some.
+    fills: u32,
     /// To be overwritten.
     spare: Vec<Spot>,
 }

@@ -80,6 +80,12 @@ impl Diffuse {
         self.asked.resize(ASKED, ((u32::MAX, u32::MAX), None));
     }
 
+    /// Begins with samples from all over the picture.
+    pub(super) fn enter_alone(&mut self) {
+        self.lights_in_view = true;
+        self.window = None;
+    }
+
     /// Ends with it.
     pub(super) fn leave(&mut self, tile: &mut Tile) {
         tile.sightlines = std::mem::take(&mut self.sightlines);

@@ -18,7 +18,7 @@ use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
 use super::scene::Surface;
 use super::surface::Interaction;
-use super::{Integrator, TraceScene};
+use super::{Integrator, RenderSettings, TraceScene};
 use crate::bvh::{Hit, Ray};
 use glam::{UVec2, Vec2, Vec3};
 
@@ -189,21 +189,7 @@ impl Batch {
     /// Adds the samples that [`Batch::begin`] has noted, of a picture of `size`.
     pub fn render(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2, rays: &mut RayCounts) {
         self.diffuse.enter(scene, tile, size);
-        self.look(scene, size);
-        self.radiance.clear();
-        // What is shared comes after what is each one's own.
-        let banks = if self.reuse.on { 2 } else { 1 };
-        self.radiance.resize(banks * self.keys.len(), Vec3::ZERO);
-        self.reuse.begin(self.keys.len());
-        rays.camera += self.rays.len() as u64;
-        self.paths.clear();
-        self.wave(scene, rays);
-        while !self.paths.is_empty() {
-            self.rays.clear();
-            self.rays.extend(self.paths.iter().map(|path| path.ray));
-            self.wave(scene, rays);
-        }
-        rays.shadow += self.share(scene);
+        self.follow(scene, size, rays);
         self.diffuse.leave(tile);
         let mut dropped = 0;
         let mut done = 0;
@@ -228,6 +214,41 @@ impl Batch {
                 }
             }
         }
+    }
+
+    /// Finds the radiance of all samples in `keys`.
+    fn follow(&mut self, scene: &TraceScene, size: UVec2, rays: &mut RayCounts) {
+        self.look(scene, size);
+        self.radiance.clear();
+        // What is shared comes after what is each one's own.
+        let banks = if self.reuse.on { 2 } else { 1 };
+        self.radiance.resize(banks * self.keys.len(), Vec3::ZERO);
+        self.reuse.begin(self.keys.len());
+        rays.camera += self.rays.len() as u64;
+        self.paths.clear();
+        self.wave(scene, rays);
+        while !self.paths.is_empty() {
+            self.rays.clear();
+            self.rays.extend(self.paths.iter().map(|path| path.ray));
+            self.wave(scene, rays);
+        }
+        rays.shadow += self.share(scene);
+    }
+
+    /// Sample number `index` of each of `pixels` of the picture, which are far apart, for no film.
+    pub fn single_samples(&mut self, scene: &TraceScene, pixels: &[UVec2], index: u32) -> &[Vec3] {
+        // Nobody is near with whom to share, and for a single sample nobody asks what is in the way of others.
+        let settings = RenderSettings { reuse: false, ..scene.settings.for_single_samples() };
+        let scene = &TraceScene { settings: &settings, ..*scene };
+        self.keys.clear();
+        self.keys.extend((0..pixels.len() as u32).map(|i| (i, index)));
+        self.pixels.clear();
+        let halves = |pixel: &UVec2| (pixel.as_vec2(), Sampler::halves(*pixel, &settings));
+        self.pixels.extend(pixels.iter().map(halves));
+        self.reuse.enter(scene, UVec2::ONE);
+        self.diffuse.enter_alone();
+        self.follow(scene, settings.size, &mut RayCounts::default());
+        &self.radiance
     }
 
     /// Makes the camera rays.

@@ -248,10 +248,11 @@ impl Lights {
     #[must_use]
     pub fn any_shape(&self, is: impl Fn(Aabb) -> bool) -> bool {
         // To ask about thousands would cost more than what is known then is worth.
-        self.seen.lights.len() > ASKED_ABOUT || self.seen.lights.iter().any(|&light| match self.get(light) {
-            FlatLight::Shape(shape) => is(shape.shape.bounds()),
-            _ => false,
-        })
+        self.seen.lights.len() > ASKED_ABOUT
+            || self.seen.lights.iter().any(|&light| match self.get(light) {
+                FlatLight::Shape(shape) => is(shape.shape.bounds()),
+                _ => false,
+            })
     }
 
     fn shapes_on<'a, B>(

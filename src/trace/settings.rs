@@ -36,6 +36,12 @@ pub struct RenderSettings {
 pub const LIGHT_SAMPLES: u32 = 2;
 
 impl RenderSettings {
+    /// For pixels that get one sample: to find out what is in the way of all of a light would take longer.
+    #[must_use]
+    pub fn for_single_samples(&self) -> Self {
+        Self { shafts: false, light_samples: 1, ..*self }
+    }
+
     /// Whether neighbours share their paths.
     #[must_use]
     pub fn shares_paths(&self) -> bool {

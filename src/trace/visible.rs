@@ -55,7 +55,8 @@ pub fn irradiance(
         if all_above { quad.irradiance(point, normal).abs() } else { piece.irradiance(normal).abs() }
     };
     let mut cut = Cut::EMPTY;
-    let mut cutting = blockers.iter().zip(0..).filter(|(_, i)| which >> i & 1 == 1).map(|(blocker, _)| blocker);
+    let mut cutting =
+        blockers.iter().zip(0..).filter(|(_, i)| which >> i & 1 == 1).map(|(blocker, _)| blocker);
     if !cutting.any(|blocker| cut.put(blocker, &piece, point)) {
         return Some(whole());
     }

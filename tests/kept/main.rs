@@ -72,6 +72,30 @@ fn a_small_step_keeps_most_and_a_change_of_light_keeps_nothing() {
 }
 
 #[test]
+fn what_comes_into_view_gets_samples_of_its_own() {
+    let mut app = watched("cornell", Integrator::Direct, SMALL);
+    app.world.insert_resource(Preview::at_scale(16));
+    // Between the walls.
+    step(&mut app, 0.4, 0.0);
+    rest(&mut app, 8);
+    step(&mut app, 0.0, 0.1);
+    moving(&mut app, Duration::ZERO);
+    let truth = LinearImage::of(&app.probe(SMALL, 64));
+    let shown = app.world.resource::<Shown>().image();
+    let coarse = app.world.resource::<Preview>().film().unwrap();
+    let (mut of_shown, mut of_preview) = (0.0, 0.0);
+    // What was beyond the left border.
+    for (x, y) in (0..SMALL.y).flat_map(|y| (0..6).map(move |x| (x, y))) {
+        let at = (y * SMALL.x + x) as usize;
+        let preview = coarse.pixel(x / 16, y / 16).mean().as_vec3();
+        of_shown += (shown.pixels[at] - truth.pixels[at]).length_squared();
+        of_preview += (preview - truth.pixels[at]).length_squared();
+    }
+    println!("squared error {of_shown:.2e}, of the preview alone {of_preview:.2e}");
+    assert!(of_shown < 0.5 * of_preview);
+}
+
+#[test]
 fn settings_a_lens_and_another_size_keep_nothing() {
     let mut app = stepped();
     app.world.resource_mut::<RenderSettings>().integrator = Integrator::Path;

@@ -1,0 +1,110 @@
+//! New samples for pixels of a moving picture of which the old ones say nothing: where something came into view, at edges.
+
+use super::Shown;
+use super::carry::Lost;
+use super::grid::note;
+use crate::trace::TraceScene;
+use crate::trace::integrator::Batch;
+use glam::{UVec2, Vec3};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Before anything was measured: seconds for a sample.
+const FIRST_GUESS: f64 = 2e-6;
+/// What a sample counts at pixels beside its own.
+const BESIDE: f32 = 0.25;
+/// Where a pixel without any looks for one, pixels.
+const NEAR: [[i32; 2]; 8] = [[-1, 0], [0, -1], [1, 0], [0, 1], [-2, 0], [0, -2], [2, 0], [0, 2]];
+
+impl Shown {
+    /// Gives samples to as many of those as there is time for, evenly; the others that have none take that of one near them.
+    pub(super) fn fill(&mut self, scene: &TraceScene, lost: &[Lost], seconds: f64) {
+        let most = (seconds / self.pace.sample.unwrap_or(FIRST_GUESS)) as usize;
+        self.fills = self.fills.wrapping_add(1);
+        let missing: Vec<UVec2> = lost.iter().flat_map(|lost| &lost.missing).copied().collect();
+        let poor: Vec<UVec2> = lost.iter().flat_map(|lost| &lost.poor).copied().collect();
+        let (missing_step, missing_first) = self.step(missing.len(), most);
+        let chosen = missing.iter().skip(missing_first).step_by(missing_step);
+        let left = most.saturating_sub(missing.len());
+        let (poor_step, poor_first) = self.step(poor.len(), left);
+        let others = poor.iter().skip(poor_first).step_by(poor_step).take(left);
+        let pixels: Vec<UVec2> = chosen.chain(others).copied().collect();
+        if pixels.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        let index = self.fills;
+        let part = pixels.len().div_ceil(2 * rayon::current_num_threads()).max(64);
+        let samples: Vec<Vec3> = pixels
+            .par_chunks(part)
+            .map_init(Batch::default, |batch, pixels| batch.single_samples(scene, pixels, index).to_vec())
+            .flatten_iter()
+            .collect();
+        note(&mut self.pace.sample, start.elapsed().as_secs_f64(), pixels.len());
+        let width = self.size.x;
+        let at = |pixel: UVec2| (pixel.y * width + pixel.x) as usize;
+        for (&pixel, &sample) in pixels.iter().zip(&samples).filter(|(_, sample)| sample.is_finite()) {
+            let kept = &mut self.kept[at(pixel)];
+            // What is there without any sample is a guess.
+            let old = if kept.w < BESIDE { 0.0 } else { kept.w };
+            *kept = ((kept.truncate() * old + sample) / (old + 1.0)).extend(old + 1.0);
+        }
+        // Twice, for there may be some only on the other side.
+        let still: Vec<UVec2> = missing.into_iter().filter(|&pixel| !self.borrow(pixel)).collect();
+        still.into_iter().rev().for_each(|pixel| {
+            self.borrow(pixel);
+        });
+    }
+
+    /// If the pixel has no sample, it takes what one beside it shows of the same thing, unless that is a mirror; false if there is
+    /// none.
+    fn borrow(&mut self, pixel: UVec2) -> bool {
+        let width = self.size.x;
+        let at = |pixel: UVec2| (pixel.y * width + pixel.x) as usize;
+        let here = at(pixel);
+        let beside = NEAR.iter().map(|&by| pixel.wrapping_add_signed(by.into()));
+        let beside = beside.filter(|there| there.cmplt(self.size).all()).map(at);
+        let mut known = beside.filter(|&there| self.kept[there].w >= BESIDE);
+        if self.kept[here].w >= BESIDE || self.spots[here].keeps == 0 {
+            return true;
+        }
+        let found = known.find(|&there| self.spots[there].thing == self.spots[here].thing);
+        let Some(there) = found else { return false };
+        self.kept[here] = self.kept[there].truncate().extend(BESIDE);
+        true
+    }
+
+    /// Each how manieth of `count` is taken if that may be `most`, and which is the first.
+    fn step(&self, count: usize, most: usize) -> (usize, usize) {
+        let step = count.div_ceil(most.max(1)).max(1);
+        (step, self.fills as usize % step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::place::Spot;
+    use glam::Vec4;
+
+    #[test]
+    fn a_pixel_without_samples_takes_those_of_the_same_thing_unless_it_is_a_mirror() {
+        let spot = |thing, keeps| Spot { thing, keeps, ..Spot::UNKNOWN };
+        let (here, other) = (Vec4::new(0.0, 0.0, 0.0, 0.01), Vec4::new(5.0, 5.0, 5.0, 8.0));
+        let of = |spots: [Spot; 3]| {
+            let size = UVec2::new(3, 1);
+            let kept = vec![other, here, Vec4::splat(2.0)];
+            let mut shown = Shown { size, kept, spots: spots.to_vec(), ..Shown::default() };
+            (shown.borrow(UVec2::new(1, 0)), shown.kept[1])
+        };
+        let of_right = Vec4::new(2.0, 2.0, 2.0, BESIDE);
+        assert_eq!(of([spot(7, 64), spot(3, 64), spot(3, 64)]), (true, of_right));
+        assert_eq!(of([spot(3, 64), spot(3, 64), spot(3, 64)]).1, other.truncate().extend(BESIDE));
+        assert_eq!(of([spot(7, 64), spot(3, 64), spot(7, 64)]), (false, here), "nobody shows it");
+        assert_eq!(
+            of([spot(3, 0), spot(3, 0), spot(3, 0)]),
+            (true, here),
+            "its neighbours show something else"
+        );
+    }
+}
