@@ -175,7 +175,7 @@ impl Aims {
             is_it[i] = (self.depth[i] > 0.0) & (self.old_depth[i] > 0.0) & (x >= 0.0) & (y >= 0.0);
             is_it[i] &= (x < width) & (y < height);
             // Somewhere in it, also if it is not a number.
-            let (x, y) = (x.max(0.0).min(width - 1.0), y.max(0.0).min(height - 1.0));
+            let (x, y) = (x.max(0.0).min(width - 0.5), y.max(0.0).min(height - 0.5));
             index[i] = whole(y) * old.size.x + whole(x);
         }
         let (mut points, mut words) = ([[0.0; RUN]; 3], [0_u32; RUN]);
@@ -242,16 +242,22 @@ mod tests {
     /// Where pixel (8, 8) finds its sample, and how far from its middle, if that is in pixel (x, y) of the old picture,
     /// of the same view.
     fn found(x: u32, y: u32) -> (u32, f32) {
+        found_from(8, x, y)
+    }
+
+    /// The same for pixel (own, own).
+    fn found_from(own: u32, x: u32, y: u32) -> (u32, f32) {
         let size = UVec2::splat(16);
         let [new, sheet] = [(); 2].map(|()| Viewpoint::default().sheet(size));
         let [start, across, down] = new.direction;
-        let position = new.origin[0] + (start + (across + down) * 8.5) * 5.0;
+        let middle = own as f32 + 0.5;
+        let position = new.origin[0] + (start + (across + down) * middle) * 5.0;
         let place = Place { position, facet: Vec3::Z, thing: 3, keeps: 64, ..Place::unknown() };
         let mut spots = vec![Spot::UNKNOWN; 256];
         spots[(y * 16 + x) as usize] = Spot::from(&place);
         let old = Old { size, sheet, cells: &[Vec4::ONE; 256], spots: &spots };
         let ways = Ways::new(&new, &old.sheet);
-        let finds = ways.aim(&new, &old.sheet, [[8.5; RUN]; 2], &place).find(&new, &old, &place, 1);
+        let finds = ways.aim(&new, &old.sheet, [[middle; RUN]; 2], &place).find(&new, &old, &place, 1);
         (finds.index[0], finds.away[0])
     }
 
@@ -261,6 +267,10 @@ mod tests {
             let (index, away) = found(x, y);
             assert_eq!(index, y * 16 + x);
             assert!(away < 1e-3, "({x}, {y}): {away} pixels");
+        }
+        // To the last one.
+        for x in [0, 15] {
+            assert_eq!(found_from(x, x, x).0, x * 17);
         }
         for (x, y) in [(10, 8), (8, 6), (5, 5)] {
             assert_eq!(found(x, y).1, f32::INFINITY, "({x}, {y})");

@@ -65,11 +65,12 @@ impl Shown {
         self.share = (count - missing) as f64 / count as f64;
         std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
-        let looked = grid.exact * self.pace.place.unwrap_or(0.0);
+        let looks: usize = lost.iter().map(|lost| lost.looks).sum();
+        let looked = looks as f64 * self.pace.place.unwrap_or(0.0);
         note(&mut self.pace.pixel, (start.elapsed().as_secs_f64() - looked).max(0.0), count);
         // Without a preview the film itself has one of each pixel.
         if preview.is_some() {
-            self.fill(scene, &lost, FILLING * seconds);
+            self.fill(scene, &lost, grid.worth, FILLING * seconds);
         }
     }
 }
@@ -81,6 +82,8 @@ pub(super) struct Lost {
     pub missing: Vec<UVec2>,
     /// Those with few.
     pub poor: Vec<UVec2>,
+    /// How many looks it took to find out.
+    looks: usize,
 }
 
 /// A row of blocks of the new picture.
@@ -108,7 +111,7 @@ impl Run {
         end - self.columns.start <= RUN as u32
             && self.place.thing == place.thing
             && self.place.facet == place.facet
-            && off.abs() <= 0.1 * new.pixel(new.own(place.position).z)
+            && (self.place.thing == Place::NOTHING || off.abs() <= 0.1 * new.pixel(new.own(place.position).z))
     }
 
     /// The middles of its pixels, row by row.
@@ -142,18 +145,20 @@ struct Carry<'a> {
 impl Carry<'_> {
     /// Fills in a band.
     fn band(&self, band: Band<'_>) -> Lost {
-        let runs = self.runs(band.v, &band.rows);
-        self.scene.geometry.tlas.isa().run(CarryBand { carry: *self, runs, band })
+        let (runs, looks) = self.runs(band.v, &band.rows);
+        let lost = self.scene.geometry.tlas.isa().run(CarryBand { carry: *self, runs, band });
+        Lost { looks, ..lost }
     }
 
-    /// The runs of a band.
-    fn runs(&self, v: u32, rows: &Range<u32>) -> Vec<Run> {
+    /// The runs of a band, and how many looks it took to find them.
+    fn runs(&self, v: u32, rows: &Range<u32>) -> (Vec<Run>, usize) {
         let grid = self.grid;
         let span = |u: u32| grid.span(u, self.old.size.x);
         let mut runs: Vec<Run> = Vec::with_capacity((grid.size.x * rows.len() as u32) as usize);
         // Blocks of one plane, some rows at once; from left to right, which memory is made for.
         let whole = |u: u32| grid.step.is_none() || !grid.at(u, v).edge;
-        let together = (RUN as u32 * grid.size.x / self.old.size.x).clamp(1, RUN as u32);
+        let width = self.old.size.x;
+        let together = ((RUN as u32 * grid.size.x + width / 2) / width).clamp(1, RUN as u32);
         for rows in parts(rows.clone(), together) {
             for u in (0..grid.size.x).filter(|&u| whole(u)) {
                 let block = grid.at(u, v);
@@ -162,7 +167,7 @@ impl Carry<'_> {
                 }
             }
         }
-        let Some(step) = grid.step else { return runs };
+        let Some(step) = grid.step else { return (runs, 0) };
         // Block by block, so that rays which are traced together stay together.
         let edges: Vec<u32> = (0..grid.size.x).filter(|&u| !whole(u)).collect();
         let half = 0.5 * step as f32;
@@ -180,15 +185,12 @@ impl Carry<'_> {
         for u in edges {
             for knots in &mut along {
                 let columns = parts(span(u), step);
-                knots.extend(columns.zip(&mut exact).map(|(columns, place)| {
-                    let x = columns.start as f32 + half;
-                    Knot { x, columns, place }
-                }));
+                knots.extend(columns.zip(&mut exact).map(|(columns, place)| Knot::new(columns, step, place)));
             }
         }
-        let mut gap = step as f32;
+        let (mut gap, mut looks) = (step as f32, middles.len());
         while gap > 1.0 {
-            self.bisect(rows, &mut along, gap);
+            looks += self.bisect(rows, &mut along, gap);
             gap *= 0.5;
         }
         for (y, knots) in rows.clone().zip(along) {
@@ -204,11 +206,11 @@ impl Carry<'_> {
                 }
             }
         }
-        runs
+        (runs, looks)
     }
 
-    /// Looks between any two knots so far apart, side by side, that show different surfaces.
-    fn bisect(&self, rows: &Range<u32>, along: &mut [Vec<Knot>], gap: f32) {
+    /// Looks between any two knots so far apart, side by side, that show different surfaces. Returns how often.
+    fn bisect(&self, rows: &Range<u32>, along: &mut [Vec<Knot>], gap: f32) -> usize {
         let mut between = Vec::new();
         for (row, knots) in along.iter().enumerate() {
             for (i, pair) in knots.windows(2).enumerate() {
@@ -232,13 +234,27 @@ impl Carry<'_> {
         // From right to left, so that what is not yet done stays where it is.
         for ((row, i, at), place) in between.into_iter().zip(found).rev() {
             let knots = &mut along[row];
-            let start = (at.x - 0.25 * gap - 0.5).ceil() as u32;
-            let end = (at.x + 0.25 * gap - 0.5).ceil() as u32;
-            knots[i].columns.end = start;
-            knots[i + 1].columns.start = end;
-            knots.insert(i + 1, Knot { x: at.x, columns: start..end, place });
+            let columns = split(knots, i, gap);
+            knots.insert(i + 1, Knot { x: at.x, columns, place });
         }
+        middles.len()
     }
+}
+
+/// Makes room between knot number `i` and the next, so far apart, for one in their middle; says for which pixels.
+fn split(knots: &mut [Knot], i: usize, gap: f32) -> Range<u32> {
+    let middle = knots[i].x + 0.5 * gap;
+    // The last of a block may stand for few.
+    let most = knots[i + 1].columns.end;
+    let (start, end) = (from(middle - 0.25 * gap).min(most), from(middle + 0.25 * gap).min(most));
+    knots[i].columns.end = start;
+    knots[i + 1].columns.start = end;
+    start..end
+}
+
+/// The first pixel whose middle is not left of `x`.
+fn from(x: f32) -> u32 {
+    (x - 0.5).ceil() as u32
 }
 
 /// A look along a row, and the pixels that it stands for.
@@ -252,6 +268,13 @@ struct Knot {
 fn parts(whole: Range<u32>, length: u32) -> impl Iterator<Item = Range<u32>> {
     let end = whole.end;
     whole.step_by(length.max(1) as usize).map(move |start| start..(start + length.max(1)).min(end))
+}
+
+impl Knot {
+    /// In the middle of as many pixels as a look usually stands for.
+    fn new(columns: Range<u32>, step: u32, place: Place) -> Self {
+        Self { x: columns.start as f32 + 0.5 * step as f32, columns, place }
+    }
 }
 
 struct CarryBand<'a> {
@@ -318,5 +341,44 @@ impl Job for CarryBand<'_> {
             }
         }
         lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn however_often_one_looks_again_each_pixel_is_of_one_knot() {
+        for (side, step) in [(2, 1), (2, 2), (4, 4), (8, 2), (8, 4), (8, 8)] {
+            for width in 1..200_u32 {
+                let blocks = (width / side).max(1);
+                let spans =
+                    (0..blocks).map(|u| (u * width).div_ceil(blocks)..((u + 1) * width).div_ceil(blocks));
+                let knot = |columns| Knot::new(columns, step, Place::unknown());
+                let mut knots: Vec<Knot> = spans.flat_map(|span| parts(span, step)).map(knot).collect();
+                let mut gap = step as f32;
+                while gap > 1.0 {
+                    // As if all were different.
+                    for i in (1..knots.len()).rev() {
+                        let [a, b] = [&knots[i - 1], &knots[i]];
+                        if a.columns.end == b.columns.start && b.x - a.x == gap {
+                            let x = 0.5 * (a.x + b.x);
+                            let columns = split(&mut knots, i - 1, gap);
+                            knots.insert(i, Knot { x, columns, place: Place::unknown() });
+                        }
+                    }
+                    gap *= 0.5;
+                }
+                let mut next = 0;
+                for columns in
+                    knots.into_iter().map(|knot| knot.columns).filter(|columns| !columns.is_empty())
+                {
+                    assert_eq!(columns.start, next, "{width} pixels in blocks of {side}, once for {step}");
+                    next = columns.end;
+                }
+                assert_eq!(next, width, "{width} pixels in blocks of {side}, once for {step}");
+            }
+        }
     }
 }

@@ -11,14 +11,20 @@ use std::time::Instant;
 
 /// Before anything was measured: seconds for a sample.
 const FIRST_GUESS: f64 = 2e-6;
-/// What a sample counts at pixels beside its own.
+/// What samples count at pixels beside their own at most, ...
 const BESIDE: f32 = 0.25;
+/// ... and at least to be taken over once more.
+const FAINT: f32 = 0.1;
+/// No sample counts as brighter, radiance: sums of more would overflow.
+const BRIGHTEST: f32 = 1e30;
 /// Where a pixel without any looks for one, pixels.
 const NEAR: [[i32; 2]; 8] = [[-1, 0], [0, -1], [1, 0], [0, 1], [-2, 0], [0, -2], [2, 0], [0, 2]];
 
 impl Shown {
     /// Gives samples to as many of those as there is time for, evenly; the others that have none take that of one near them.
-    pub(super) fn fill(&mut self, scene: &TraceScene, lost: &[Lost], seconds: f64) {
+    /// What has no sample at all counts `guess`.
+    pub(super) fn fill(&mut self, scene: &TraceScene, lost: &[Lost], guess: f32, seconds: f64) {
+        let start = Instant::now();
         let most = (seconds / self.pace.sample.unwrap_or(FIRST_GUESS)) as usize;
         self.fills = self.fills.wrapping_add(1);
         let missing: Vec<UVec2> = lost.iter().flat_map(|lost| &lost.missing).copied().collect();
@@ -32,7 +38,6 @@ impl Shown {
         if pixels.is_empty() {
             return;
         }
-        let start = Instant::now();
         let index = self.fills;
         let part = pixels.len().div_ceil(2 * rayon::current_num_threads()).max(64);
         let samples: Vec<Vec3> = pixels
@@ -40,37 +45,42 @@ impl Shown {
             .map_init(Batch::default, |batch, pixels| batch.single_samples(scene, pixels, index).to_vec())
             .flatten_iter()
             .collect();
-        note(&mut self.pace.sample, start.elapsed().as_secs_f64(), pixels.len());
         let width = self.size.x;
         let at = |pixel: UVec2| (pixel.y * width + pixel.x) as usize;
         for (&pixel, &sample) in pixels.iter().zip(&samples).filter(|(_, sample)| sample.is_finite()) {
             let kept = &mut self.kept[at(pixel)];
-            // What is there without any sample is a guess.
-            let old = if kept.w < BESIDE { 0.0 } else { kept.w };
+            let old = if kept.w > guess { kept.w } else { 0.0 };
+            let sample = sample.min(Vec3::splat(BRIGHTEST));
             *kept = ((kept.truncate() * old + sample) / (old + 1.0)).extend(old + 1.0);
         }
-        // Twice, for there may be some only on the other side.
-        let still: Vec<UVec2> = missing.into_iter().filter(|&pixel| !self.borrow(pixel)).collect();
-        still.into_iter().rev().for_each(|pixel| {
-            self.borrow(pixel);
-        });
+        // Where nearly all is new, there is nobody to ask.
+        if missing.len() < self.kept.len() / 4 {
+            // Twice, for there may be some only on the other side.
+            let still: Vec<UVec2> = missing.into_iter().filter(|&pixel| !self.borrow(pixel, guess)).collect();
+            still.into_iter().rev().for_each(|pixel| {
+                self.borrow(pixel, guess);
+            });
+        }
+        note(&mut self.pace.sample, start.elapsed().as_secs_f64(), pixels.len());
     }
 
     /// If the pixel has no sample, it takes what one beside it shows of the same thing, unless that is a mirror; false if there is
     /// none.
-    fn borrow(&mut self, pixel: UVec2) -> bool {
+    fn borrow(&mut self, pixel: UVec2, guess: f32) -> bool {
         let width = self.size.x;
         let at = |pixel: UVec2| (pixel.y * width + pixel.x) as usize;
         let here = at(pixel);
         let beside = NEAR.iter().map(|&by| pixel.wrapping_add_signed(by.into()));
         let beside = beside.filter(|there| there.cmplt(self.size).all()).map(at);
-        let mut known = beside.filter(|&there| self.kept[there].w >= BESIDE);
-        if self.kept[here].w >= BESIDE || self.spots[here].keeps == 0 {
+        let mut known = beside.filter(|&there| self.kept[there].w > guess.max(FAINT));
+        if self.kept[here].w > guess || self.spots[here].keeps == 0 {
             return true;
         }
         let found = known.find(|&there| self.spots[there].thing == self.spots[here].thing);
         let Some(there) = found else { return false };
-        self.kept[here] = self.kept[there].truncate().extend(BESIDE);
+        // The farther it comes, the less it counts.
+        let there = self.kept[there];
+        self.kept[here] = there.truncate().extend((0.5 * there.w).min(BESIDE));
         true
     }
 
@@ -95,7 +105,7 @@ mod tests {
             let size = UVec2::new(3, 1);
             let kept = vec![other, here, Vec4::splat(2.0)];
             let mut shown = Shown { size, kept, spots: spots.to_vec(), ..Shown::default() };
-            (shown.borrow(UVec2::new(1, 0)), shown.kept[1])
+            (shown.borrow(UVec2::new(1, 0), 0.01), shown.kept[1])
         };
         let of_right = Vec4::new(2.0, 2.0, 2.0, BESIDE);
         assert_eq!(of([spot(7, 64), spot(3, 64), spot(3, 64)]), (true, of_right));

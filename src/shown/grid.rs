@@ -46,8 +46,6 @@ pub struct Grid<'a> {
     blocks: Vec<Place>,
     /// Blocks that see an edge are looked at anew along each row, once for so many pixels, if there is time.
     pub step: Option<u32>,
-    /// How many looks that takes.
-    pub exact: f64,
     preview: Option<&'a Film>,
     /// What a sample of the preview counts: it is of many pixels.
     pub worth: f32,
@@ -103,12 +101,13 @@ impl<'a> Grid<'a> {
         let at_edges = count as f64 * pixels / blocks.len() as f64;
         let place = pace.place.unwrap_or(FIRST_GUESS);
         let looks = |(step, again): (u32, f64)| at_edges / f64::from(step) * again;
-        let [.., coarsest] = STEPS;
         let fits = |step: (u32, f64), left: f64| (looks(step) * place <= left).then_some(step);
-        let step = STEPS.into_iter().find_map(|step| fits(step, left));
-        let step = step.or(fits(coarsest, left.max(0.0) + OVERTIME * seconds));
-        let exact = step.map_or(0.0, looks);
-        Self { size, step: step.map(|(step, _)| step), exact, blocks, preview, worth }
+        // A look stands for pixels of its own block.
+        let steps = || STEPS.into_iter().filter(|(step, _)| *step <= side);
+        let step = steps().find_map(|step| fits(step, left));
+        let in_overtime = |step| fits(step, left.max(0.0) + OVERTIME * seconds);
+        let step = step.or_else(|| steps().next_back().and_then(in_overtime));
+        Self { size, step: step.map(|(step, _)| step), blocks, preview, worth }
     }
 
     /// Pixels of block column `u` of a row of `width`.

@@ -2,8 +2,9 @@
 //!
 //! The film begins anew with each step of the camera, and stays what it is: unbiased. What is *shown* is a mean
 //! of its samples and of those that were shown before, found again where their surface is now ([`carry`]). The
-//! more samples the film has, the less the old ones count, and from [`FADE`] on it stands alone. In its first second
-//! it is also shown smoothed ([`smooth`]). Neither ever touches the film, nor a picture that is finished.
+//! more samples the film has, the less the old ones count, and from [`FADE`] on it stands alone. Where no old sample is right
+//! there are a few new ones for that picture alone ([`fill`]). In its first second it is also shown smoothed ([`smooth`]). None of
+//! that ever touches the film, nor a picture that is finished.
 
 mod aim;
 mod carry;
@@ -90,6 +91,8 @@ impl Shown {
         self.exact_rows = 0;
         (self.is_kept, self.is_whole) = (false, false);
         self.seconds[0] = 0.0;
+        // Other light may cost much more.
+        self.pace.sample = None;
     }
 
     /// Share of the pixels that show old samples, in 0..=1, beside a film of so many samples per pixel.

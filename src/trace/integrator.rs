@@ -235,9 +235,9 @@ impl Batch {
         rays.shadow += self.share(scene);
     }
 
-    /// Sample number `index` of each of `pixels` of the picture, which are far apart, for no film.
+    /// Sample number `index` of each of `pixels` of the picture, wherever they are, for no film.
     pub fn single_samples(&mut self, scene: &TraceScene, pixels: &[UVec2], index: u32) -> &[Vec3] {
-        // Nobody is near with whom to share, and for a single sample nobody asks what is in the way of others.
+        // Neighbours that share have whole tiles, and for a single sample nobody asks what is in the way of others.
         let settings = RenderSettings { reuse: false, ..scene.settings.for_single_samples() };
         let scene = &TraceScene { settings: &settings, ..*scene };
         self.keys.clear();

@@ -182,7 +182,8 @@ pub struct Reach<'a> {
     pub quad: &'a Quad,
     /// Fewer than 32.
     pub blockers: &'a [Blocker],
-    /// A bit for each of them, for each point of `lanes`; all are set where one hides all of it.
+    /// A bit for each of them, for each point of `lanes`; all are set where one hides all of it. For other points it may be
+    /// anything then.
     pub out: &'a mut [u32; LANES],
 }
 
@@ -243,7 +244,7 @@ impl<F: Lanes> Outlook<F> {
         let b = minus(&corner(simd, b), &point);
         let c = minus(&corner(simd, c), &point);
         let d = minus(&corner(simd, d), &point);
-        let far = size(&a) + size(&c);
+        let far = (size(&a) + size(&c)).max(size(&b) + size(&d));
         Self { point, lamp: [a, b, c, d], far }
     }
 
