@@ -17,7 +17,7 @@ const FIRST_LOOK: f64 = 0.6;
 /// when it is looked again between different ones; ...
 const STEPS: [(u32, f64); 4] = [(1, 1.0), (2, 1.2), (4, 1.4), (8, 2.0)];
 /// ... or somewhat less, as a share of the time for carrying over: without, thin things fall apart.
-const OVERTIME: f64 = 0.35;
+const OVERTIME: f64 = 0.25;
 
 /// What carrying over costs on this machine in this scene.
 #[derive(Clone, Copy, Debug, Default)]
