@@ -39,7 +39,8 @@ impl Default for Preview {
 }
 
 impl Preview {
-    /// As coarse as this, however fast the machine is: for pictures that are to be compared.
+    /// As coarse as this, and with all the time that it takes, however fast the machine is: for pictures that are to
+    /// be compared.
     #[must_use]
     pub fn at_scale(scale: u32) -> Self {
         Self { scale: scale.max(1), fixed: true, ..Self::default() }
@@ -85,9 +86,12 @@ impl Preview {
         self.others = 0.75 * self.others + 0.25 * others.clamp(0.0, ANSWER);
     }
 
-    /// Seconds for it and for what is carried over.
+    /// Seconds for it and for what is carried over; unlimited if its coarseness is given.
     #[must_use]
     pub fn target(&self) -> f64 {
+        if self.fixed {
+            return f64::INFINITY;
+        }
         (ANSWER - self.others).clamp(LEAST, TARGET)
     }
 
@@ -140,5 +144,6 @@ mod tests {
         let mut fixed = Preview { seconds_per_pixel: Some(1e9), ..Preview::at_scale(2) };
         fixed.choose_scale(1.0);
         assert_eq!(fixed.scale, 2, "unless told");
+        assert_eq!(fixed.target(), f64::INFINITY, "and then nobody counts the time");
     }
 }

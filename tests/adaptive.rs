@@ -135,15 +135,20 @@ fn hurried(stage: &Stage, samples: u32, patience: u32) -> Film {
     let mut film = Film::new(scene.settings.size, 0);
     trace_pass(&scene, &mut film, 1, 1, || true);
     hurry(&scene, &mut film);
+    go_on(&scene, &mut film, samples, patience);
+    film
+}
+
+/// Until each pixel has `samples` on average, broken off again and again.
+fn go_on(scene: &TraceScene, film: &mut Film, samples: u32, patience: u32) {
     for turn in 0.. {
         if film.complete_samples() >= samples {
             break;
         }
-        assert!(turn < 10_000, "never ends");
+        assert!(turn < 100_000, "never ends");
         let asked = AtomicU32::new(0);
-        trace_adaptive(&scene, &mut film, samples, 1, || asked.fetch_add(1, Ordering::Relaxed) < patience);
+        trace_adaptive(scene, film, samples, 1, || asked.fetch_add(1, Ordering::Relaxed) < patience);
     }
-    film
 }
 
 #[test]
@@ -195,14 +200,7 @@ fn a_hurry_ends_also_where_only_a_part_is_refined() {
 fn ripened(stage: &Stage, samples: u32, patience: u32) -> Film {
     let scene = stage.scene();
     let mut film = Film::new(scene.settings.size, 0);
-    for turn in 0.. {
-        if film.complete_samples() >= samples {
-            break;
-        }
-        assert!(turn < 100_000, "never ends");
-        let asked = AtomicU32::new(0);
-        trace_adaptive(&scene, &mut film, samples, 1, || asked.fetch_add(1, Ordering::Relaxed) < patience);
-    }
+    go_on(&scene, &mut film, samples, patience);
     film
 }
 

@@ -107,8 +107,8 @@ fn develop_row(row: &[Vec4], y: u32, display: &Display, bytes: &mut [u8]) {
     let gain = display.exposure.exp2();
     match display.tone_map {
         // A function of its own, without curves.
-        ToneMap::Clip => Isa::best().run(Developed { row, y, gain, map: |color| color, bytes }),
-        map => Isa::best().run(Developed { row, y, gain, map: |color| map.apply(color), bytes }),
+        ToneMap::Clip => Isa::detect().run(Developed { row, y, gain, map: |color| color, bytes }),
+        map => Isa::detect().run(Developed { row, y, gain, map: |color| map.apply(color), bytes }),
     }
 }
 

@@ -39,6 +39,11 @@ pub fn note(pace: &mut Option<f64>, seconds: f64, count: usize) {
     *pace = Some(pace.map_or(measured, |old| 0.5 * (old + measured)));
 }
 
+/// Which of `length` pixels are those of block number `i` of `blocks`.
+fn part(i: u32, blocks: u32, length: u32) -> Range<u32> {
+    (i * length).div_ceil(blocks)..((i + 1) * length).div_ceil(blocks)
+}
+
 /// The new picture in blocks, and its preview.
 pub struct Grid<'a> {
     pub size: UVec2,
@@ -79,7 +84,8 @@ impl<'a> Grid<'a> {
         let took = start.elapsed().as_secs_f64();
         left -= took;
         note(&mut pace.place, took, blocks.len());
-        // Planes must go on from block to block.
+        // Planes must go on to the four blocks beside: what only touches the corner of a block is found by the next step, and
+        // asking all eight makes more blocks edges than there is time for.
         let mut edges = vec![false; blocks.len()];
         edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
             for (x, edge) in edges.iter_mut().enumerate() {
@@ -111,13 +117,13 @@ impl<'a> Grid<'a> {
     }
 
     /// Pixels of block column `u` of a row of `width`.
-    pub fn span(&self, u: u32, width: u32) -> Range<u32> {
-        (u * width).div_ceil(self.size.x)..((u + 1) * width).div_ceil(self.size.x)
+    pub fn columns(&self, u: u32, width: u32) -> Range<u32> {
+        part(u, self.size.x, width)
     }
 
     /// Rows of pixels of block row `v` of a picture of so many rows.
     pub fn rows(&self, v: u32, height: u32) -> Range<u32> {
-        (v * height).div_ceil(self.size.y)..((v + 1) * height).div_ceil(self.size.y)
+        part(v, self.size.y, height)
     }
 
     pub fn at(&self, x: u32, y: u32) -> &Place {

@@ -10,6 +10,7 @@ mod aim;
 mod carry;
 mod fill;
 mod grid;
+mod runs;
 mod smooth;
 
 use crate::app::{FrameBudget, FrameStats};

@@ -18,7 +18,7 @@ use super::reuse::Reuse;
 use super::sampler::{Sampler, SamplerRow};
 use super::scene::Surface;
 use super::surface::Interaction;
-use super::{Integrator, RenderSettings, TraceScene};
+use super::{Integrator, TraceScene};
 use crate::bvh::{Hit, Ray};
 use glam::{UVec2, Vec2, Vec3};
 
@@ -217,7 +217,7 @@ impl Batch {
     }
 
     /// Finds the radiance of all samples in `keys`.
-    fn follow(&mut self, scene: &TraceScene, size: UVec2, rays: &mut RayCounts) {
+    pub(super) fn follow(&mut self, scene: &TraceScene, size: UVec2, rays: &mut RayCounts) {
         self.look(scene, size);
         self.radiance.clear();
         // What is shared comes after what is each one's own.
@@ -233,22 +233,6 @@ impl Batch {
             self.wave(scene, rays);
         }
         rays.shadow += self.share(scene);
-    }
-
-    /// Sample number `index` of each of `pixels` of the picture, wherever they are, for no film.
-    pub fn single_samples(&mut self, scene: &TraceScene, pixels: &[UVec2], index: u32) -> &[Vec3] {
-        // Neighbours that share have whole tiles, and for a single sample nobody asks what is in the way of others.
-        let settings = RenderSettings { reuse: false, ..scene.settings.for_single_samples() };
-        let scene = &TraceScene { settings: &settings, ..*scene };
-        self.keys.clear();
-        self.keys.extend((0..pixels.len() as u32).map(|i| (i, index)));
-        self.pixels.clear();
-        let halves = |pixel: &UVec2| (pixel.as_vec2(), Sampler::halves(*pixel, &settings));
-        self.pixels.extend(pixels.iter().map(halves));
-        self.reuse.enter(scene, UVec2::ONE);
-        self.diffuse.enter_alone();
-        self.follow(scene, settings.size, &mut RayCounts::default());
-        &self.radiance
     }
 
     /// Makes the camera rays.

@@ -30,6 +30,7 @@ pub mod scene;
 pub mod settings;
 pub mod shape_light;
 mod sightlines;
+mod single;
 pub mod sky;
 pub mod spherical;
 pub mod surface;

@@ -24,6 +24,8 @@ pub fn watched(scene: &str, integrator: Integrator, size: UVec2) -> App {
         sample_target: 1024,
         ..FrameBudget::default()
     });
+    // What is kept may not depend on what else the machine does.
+    world.insert_resource(Preview::at_scale(8));
     // A camera of our own where that of the file is.
     let from = world.resource::<ActiveCamera>().0;
     let camera = *world.get::<Camera>(from).unwrap();

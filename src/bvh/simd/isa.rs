@@ -56,17 +56,11 @@ impl Isa {
     /// One float at a time; every machine has it.
     pub const SCALAR: Self = Self(Kind::Plain);
 
-    /// The widest that this machine has.
+    /// The widest that this machine has, found out once.
     #[must_use]
     pub fn detect() -> Self {
-        *Self::available().last().unwrap_or(&Self::SCALAR)
-    }
-
-    /// The same, found out once.
-    #[must_use]
-    pub fn best() -> Self {
-        static BEST: LazyLock<Isa> = LazyLock::new(Isa::detect);
-        *BEST
+        static WIDEST: LazyLock<Isa> = LazyLock::new(|| Isa::available().pop().unwrap_or(Isa::SCALAR));
+        *WIDEST
     }
 
     /// All that this machine has, narrowest first.

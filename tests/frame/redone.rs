@@ -1,90 +1,23 @@
-//! The rules of change: what is redone, what resets the film, and what does not.
+//! What a change redoes, that it resets the film, and what does not.
 
+use super::stage::{Stage, quad, stage};
 use bevy_ecs::hierarchy::ChildOf;
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use bevy_ecs::schedule::{LogLevel, ScheduleBuildSettings};
-use glam::{DAffine3, DVec3, UVec2, Vec2, Vec3};
-use penumbra::app::{App, Frame, FrameBudget, FrameStats};
+use glam::{DAffine3, DVec3, UVec2, Vec3};
+use penumbra::app::{App, FrameBudget, FrameStats};
 use penumbra::bvh::Ray;
-use penumbra::image::{Display, Picture};
+use penumbra::image::Display;
 use penumbra::scene::{
-    ActiveCamera, Camera, Encoding, Filter, Instance, Light, Material, Mesh, Texels, Texture, Transform,
-    TriangleMesh, Visible, Wrap,
+    ActiveCamera, Camera, Filter, Instance, Light, Material, Mesh, Texture, Transform, Visible,
 };
 use penumbra::sync::Redone;
-use penumbra::trace::explain::{Kind, explain};
-use penumbra::trace::{Film, Geometry, Integrator, RenderSettings};
+use penumbra::trace::{Geometry, Integrator, RenderSettings};
 use std::sync::Arc;
 
-const SIZE: UVec2 = UVec2::new(40, 30);
-
-/// A quad on the floor and one above it under a group node, a lamp, and a camera that sees them.
-struct Stage {
-    app: App,
-    group: Entity,
-    floor: Entity,
-    floating: Entity,
-    floor_mesh: Entity,
-    material: Entity,
-    texture: Entity,
-    lamp: Entity,
-    camera: Entity,
-}
-
-fn quad(size: f32) -> Mesh {
-    let s = 0.5 * size;
-    let corner = |x, z| Vec3::new(x * s, 0.0, z * s);
-    Mesh(Arc::new(TriangleMesh {
-        positions: vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)],
-        uvs: vec![Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..TriangleMesh::default()
-    }))
-}
-
-fn stage() -> Stage {
-    let mut app = App::new(RenderSettings { size: SIZE, ..RenderSettings::default() });
-    let world = &mut app.world;
-    let floor_mesh = world.spawn(quad(4.0)).id();
-    let small_mesh = world.spawn(quad(1.0)).id();
-    let texels = Texels { width: 2, height: 1, texels: vec![[200, 200, 200, 255], [90, 90, 90, 255]] };
-    let texture = Texture {
-        texels: Arc::new(texels),
-        encoding: Encoding::Srgb,
-        wrap: [Wrap::Repeat; 2],
-        filter: Filter::Bilinear,
-    };
-    let texture = world.spawn(texture).id();
-    let textured = Material { base_color_texture: Some(texture.into()), ..Material::default() };
-    let material = world.spawn(textured).id();
-    let floor = world.spawn(Instance { mesh: floor_mesh, materials: vec![material] }).id();
-    let group = world.spawn(Transform::from_translation(DVec3::new(0.0, 0.5, 0.0))).id();
-    let floating = world
-        .spawn((Instance { mesh: small_mesh, materials: vec![] }, Transform::default(), ChildOf(group)))
-        .id();
-    let lamp = Light::Parallelogram {
-        edge_u: Vec3::X,
-        edge_v: Vec3::Z,
-        radiance: [Vec3::splat(10.0); 4],
-        two_sided: false,
-    };
-    let lamp = world.spawn((lamp, Transform::from_translation(DVec3::new(0.0, 3.0, 0.0)))).id();
-    let pose = Transform::looking_at(DVec3::new(0.0, 2.0, 4.0), DVec3::ZERO, DVec3::Y);
-    let camera = world.spawn((Camera::default(), pose)).id();
-    world.insert_resource(ActiveCamera(camera));
-    world.insert_resource(FrameBudget { sample_target: 1000, ..FrameBudget::default() });
-    Stage { app, group, floor, floating, floor_mesh, material, texture, lamp, camera }
-}
+const NOTHING: Redone = Redone { blas: 0, refits: 0, tlas: 0, surfaces: 0, lights: 0, resets: 0 };
 
 impl Stage {
-    fn settled() -> Self {
-        let mut stage = stage();
-        stage.app.frame();
-        stage.app.frame();
-        stage
-    }
-
     /// What the next frame redoes after `change`, and that the frame after it redoes nothing.
     fn redone_by(&mut self, change: impl FnOnce(&mut Self)) -> Redone {
         let count = |app: &App| *app.world.resource::<Redone>();
@@ -103,20 +36,7 @@ impl Stage {
             resets: after.resets - before.resets,
         }
     }
-
-    fn film(&self) -> &Film {
-        self.app.world.resource::<Film>()
-    }
-
-    fn get_mut<T: Component<Mutability = bevy_ecs::component::Mutable>>(
-        &mut self,
-        entity: Entity,
-    ) -> Mut<'_, T> {
-        self.app.world.get_mut::<T>(entity).unwrap()
-    }
 }
-
-const NOTHING: Redone = Redone { blas: 0, refits: 0, tlas: 0, surfaces: 0, lights: 0, resets: 0 };
 
 #[test]
 fn the_first_frame_does_each_thing_once() {
@@ -333,141 +253,4 @@ fn nothing_else_resets() {
     };
     assert_eq!(stage.redone_by(other_camera), NOTHING, "a camera that nobody looks through");
     assert_eq!(stage.film().complete_samples(), 2 + 2 * 6);
-}
-
-#[test]
-fn a_despawned_entity_disappears_from_the_picture() {
-    let mut stage = Stage::settled();
-    let group = stage.group;
-    // With its children.
-    assert!(stage.app.world.despawn(group));
-    stage.app.frame();
-    let mut fresh = self::stage();
-    let group = fresh.group;
-    assert!(fresh.app.world.despawn(group));
-    fresh.app.frame();
-    assert_eq!(stage.film(), fresh.film());
-    assert_ne!(stage.film(), { self::stage() }.one_frame().film());
-}
-
-impl Stage {
-    fn one_frame(mut self) -> Self {
-        self.app.frame();
-        self
-    }
-}
-
-#[test]
-fn a_picture_after_edits_equals_that_of_a_fresh_world() {
-    let mut edited = Stage::settled();
-    let (lamp, floor, material, floating) = (edited.lamp, edited.floor, edited.material, edited.floating);
-    let edit = |s: &mut Stage| {
-        s.get_mut::<Transform>(lamp).0.translation = DVec3::new(0.5, 2.0, 0.1);
-        s.get_mut::<Transform>(floor).0.translation.y = -0.25;
-        s.get_mut::<Material>(material).base_color = Vec3::new(0.2, 0.5, 0.7);
-        assert!(s.app.world.despawn(floating));
-    };
-    edit(&mut edited);
-    edited.app.frame();
-    let mut fresh = stage();
-    edit(&mut fresh);
-    assert_eq!(edited.film(), fresh.one_frame().film());
-}
-
-#[test]
-fn no_two_systems_race() {
-    let mut stage = stage();
-    stage.app.world.schedule_scope(Frame, |world, schedule| {
-        schedule.set_build_settings(ScheduleBuildSettings {
-            ambiguity_detection: LogLevel::Error,
-            ..ScheduleBuildSettings::default()
-        });
-        schedule.initialize(world).unwrap();
-    });
-}
-
-#[test]
-fn the_target_ends_the_work_and_a_higher_one_continues_it() {
-    let mut stage = stage();
-    stage.app.world.resource_mut::<FrameBudget>().sample_target = 3;
-    for _ in 0..5 {
-        stage.app.frame();
-    }
-    assert_eq!(stage.film().complete_samples(), 3);
-    assert!(stage.app.world.resource::<FrameStats>().done);
-    stage.app.world.resource_mut::<FrameBudget>().sample_target = 4;
-    stage.app.frame();
-    assert_eq!(stage.film().complete_samples(), 4);
-}
-
-#[test]
-fn a_watched_frame_shows_a_whole_picture_even_if_interrupted_at_once() {
-    let mut stage = stage();
-    {
-        let mut budget = stage.app.world.resource_mut::<FrameBudget>();
-        budget.preview = true;
-        budget.develop = true;
-        budget.time = Some(std::time::Duration::ZERO);
-        budget.interrupt.store(true, std::sync::atomic::Ordering::Relaxed);
-    }
-    stage.app.frame();
-    let picture = stage.app.world.resource::<Picture>();
-    assert_eq!((picture.size, picture.version), (SIZE, 1));
-    let lit = picture.rgba.chunks_exact(4).filter(|p| p[0] > 30).count();
-    assert!(lit > 200, "the floor is in the picture: {lit} lit pixels");
-    stage.app.frame();
-    assert_eq!(stage.app.world.resource::<Picture>().version, 1, "nothing new, nothing developed");
-}
-
-#[test]
-fn empty_worlds_and_dark_scenes_are_pictures_too() {
-    let mut empty = App::new(RenderSettings { size: UVec2::ONE, ..RenderSettings::default() });
-    empty.frame();
-    assert_eq!(empty.world.resource::<Film>().pixel(0, 0).mean(), DVec3::ZERO);
-    let mut stage = stage();
-    let lamp = stage.lamp;
-    assert!(stage.app.world.despawn(lamp));
-    stage.app.frame();
-    assert_eq!(stage.film().pixel(20, 15).mean(), DVec3::ZERO);
-}
-
-#[test]
-fn an_explanation_adds_up_to_the_picture() {
-    let mut stage = stage();
-    stage
-        .app
-        .world
-        .spawn((Light::Point { intensity: Vec3::ONE }, Transform::from_translation(DVec3::Y * 2.0)));
-    {
-        let mut budget = stage.app.world.resource_mut::<FrameBudget>();
-        (budget.sample_target, budget.pass_samples) = (64, 64);
-    }
-    stage.app.frame();
-    let scene = penumbra::sync::traceable(&stage.app.world);
-    let (mut lit, mut blocked) = (0, 0);
-    let (mut told_sum, mut film_sum, mut variance) = (0.0, 0.0, 0.0);
-    for (x, y) in (0..SIZE.y).flat_map(|y| (0..SIZE.x).map(move |x| (x, y))) {
-        let told = explain(&scene, UVec2::new(x, y), 0..64, 10.0);
-        assert_eq!(told.radiance.len(), 64);
-        let reds: Vec<f64> = told.radiance.iter().map(|r| f64::from(r.x)).collect();
-        let mean = reds.iter().sum::<f64>() / 64.0;
-        variance += reds.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 64.0 / 63.0;
-        told_sum += mean;
-        film_sum += stage.film().pixel(x, y).mean().x;
-        let brought: f32 = told.lights.iter().map(|row| row.contribution).sum();
-        let all = told.radiance.iter().map(|&r| penumbra::scene::color::luminance(r)).sum::<f32>() / 64.0;
-        assert!((brought - all).abs() <= 1e-4 * all, "{x} {y}: {brought} of {all}");
-        for row in &told.lights {
-            assert!(row.lit + row.dark <= row.samples, "{row:?}");
-            assert!(row.lit == 0 || row.contribution > 0.0, "{row:?}");
-        }
-        let count = |kind| told.segments.iter().filter(|s| s.kind == kind).count();
-        assert_eq!(count(Kind::Camera), 64);
-        assert_eq!(count(Kind::Lit), told.lights.iter().map(|row| row.lit as usize).sum::<usize>());
-        (lit, blocked) = (lit + count(Kind::Lit), blocked + count(Kind::Shadow));
-    }
-    assert!(lit > 1000 && blocked > 30, "the quad throws a shadow: {lit} {blocked}");
-    // No lamp is in view, so all light is that of the samples. The film's share of the noise is smaller still.
-    let off = (told_sum - film_sum).abs() / (2.0 * variance).sqrt();
-    assert!(off < 4.0, "{told_sum} told, {film_sum} in the film: {off} standard errors");
 }
