@@ -231,7 +231,7 @@ fn is_worth_developing(budget: Res<FrameBudget>, stats: Res<FrameStats>) -> bool
 const FEW_SAMPLES: f64 = 3.0;
 
 /// How many times as long as an estimate of the noise takes is traced before the next, unless it is asked for.
-const ESTIMATE: f64 = 12.0;
+const ESTIMATE: f64 = 20.0;
 
 /// When the noise was estimated, in seconds of tracing, and how long that took.
 #[derive(Default)]

@@ -68,10 +68,17 @@ fn luminances(film: &Film) -> Option<(Vec<f64>, Vec<f64>)> {
         let all = in_a + in_b;
         Some(((a * in_a + b * in_b) / all, (a - b) * (in_a * in_b).sqrt() / all))
     };
-    let row = |y: u32| film.row(y).map(halves).collect::<Option<(Vec<_>, Vec<_>)>>();
-    let rows: Vec<_> = (0..film.size().y).into_par_iter().map(row).collect::<Option<_>>()?;
-    let (picture, errors): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
-    Some((picture.concat(), errors.concat()))
+    let size = film.size();
+    let (width, count) = (size.x as usize, size.element_product() as usize);
+    let (mut picture, mut errors) = (vec![0.0; count], vec![0.0; count]);
+    let rows = picture.par_chunks_exact_mut(width).zip(errors.par_chunks_exact_mut(width)).zip(0..size.y);
+    let is_ready = rows.map(|((picture, errors), y)| {
+        let mut places = picture.iter_mut().zip(errors).zip(film.row(y));
+        places.all(|((luminance, error), pixel)| {
+            halves(pixel).map(|found| (*luminance, *error) = found).is_some()
+        })
+    });
+    is_ready.reduce(|| true, |a, b| a && b).then_some((picture, errors))
 }
 
 /// What [`relative_noise`] estimates: the error of a picture against the truth, both as luminances in rows
@@ -96,33 +103,31 @@ fn squares(errors: &[f64], brightness: &[f64], size: UVec2) -> Option<Vec<f64>> 
     let middle = lit.len() / 2;
     let median = *lit.select_nth_unstable_by(middle, f64::total_cmp).1;
     let floor = (0.1 * median).powi(2);
-    let around = means_around(brightness, size);
-    Some(errors.iter().zip(around).map(|(e, l)| e * e / (l * l + floor)).collect())
+    let mut squares = means_around(brightness, size);
+    squares.par_iter_mut().zip(errors).with_min_len(4096).for_each(|(mean, e)| {
+        *mean = e * e / (*mean * *mean + floor);
+    });
+    Some(squares)
 }
 
-/// Means over squares around each pixel, as far as they lie in the picture: first along rows, then columns.
+/// Means over squares around each pixel, as far as they lie in the picture: first along columns, then rows.
 fn means_around(values: &[f64], size: UVec2) -> Vec<f64> {
     let (width, height) = (size.x as usize, size.y as usize);
     let reach = |at: usize, end: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(end);
-    let mut along = Vec::with_capacity(values.len());
-    for row in values.chunks_exact(width) {
-        for x in 0..width {
-            let near = &row[reach(x, width)];
-            along.push(near.iter().sum::<f64>() / near.len() as f64);
+    let mut means = vec![0.0; values.len()];
+    let rows = means.par_chunks_exact_mut(width).enumerate();
+    rows.for_each_init(Vec::new, |sums: &mut Vec<f64>, (y, means)| {
+        let near = reach(y, height);
+        sums.clear();
+        sums.resize(width, 0.0);
+        for row in values[near.start * width..near.end * width].chunks_exact(width) {
+            sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
         }
-    }
-    let mut means = Vec::with_capacity(values.len());
-    for y in 0..height {
-        let rows = reach(y, height);
-        let share = 1.0 / rows.len() as f64;
-        means.resize((y + 1) * width, 0.0);
-        for near in rows {
-            let row = &along[near * width..][..width];
-            for (mean, value) in means[y * width..].iter_mut().zip(row) {
-                *mean += value * share;
-            }
+        for (x, mean) in means.iter_mut().enumerate() {
+            let across = reach(x, width);
+            *mean = sums[across.clone()].iter().sum::<f64>() / (across.len() * near.len()) as f64;
         }
-    }
+    });
     means
 }
 
