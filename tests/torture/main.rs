@@ -1,4 +1,5 @@
 //! The torture chamber's cases hold, and every checker finds who does it wrong.
 
 mod geometry;
+mod scenes;
 mod show;

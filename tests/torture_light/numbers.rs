@@ -1,19 +1,22 @@
 //! Random numbers, sums and errors that are a little wrong.
 
-use crate::finds;
-use glam::Vec2;
+use crate::{finds, trial};
+use bevy_ecs::prelude::*;
+use glam::{Vec2, Vec3};
+use penumbra::load::{Made, SceneSource};
+use penumbra::scene::{ActiveCamera, Camera, Light, Transform};
 use penumbra::torture::Check;
 use penumbra::torture::light::lamps::quads;
 use penumbra::torture::light::meter::{Ask, ours};
-use penumbra::torture::light::numbers::{below_one, neighbours, net, over_seeds, unbiased};
+use penumbra::torture::light::numbers::{below_one, neighbours, net, next_seed, over_seeds, unbiased};
 use penumbra::torture::light::pictures::{
     adaptively, bias, bit_of_everything, differing, in_passes, strip, strip_in_closed_form,
 };
 use penumbra::torture::light::shadows::penumbra;
 use penumbra::torture::light::slopes::{Slope, errors, judge_long_run, judge_slope};
-use penumbra::torture::light::sums::{Accumulator, a_day, adding, poison};
+use penumbra::torture::light::sums::{Accumulator, a_day, adding, exposed, poison, poisoned_film, scenes};
 use penumbra::torture::oracle::Rng;
-use penumbra::torture::stage::reds;
+use penumbra::torture::stage::{Stage, reds};
 use penumbra::trace::allot::EVEN;
 use penumbra::trace::sampler::{Sampler, hash, unit_float};
 use penumbra::trace::{Film, Sampling, TraceScene, trace_pass};
@@ -72,6 +75,19 @@ fn repeated_seeds_are_found() {
     assert!(!neighbours("no noise at all", 128, &vec![1.0; 128 * 128]).holds());
 }
 
+#[test]
+fn seeds_with_the_same_noise_are_found() {
+    let spots = penumbra(1.0, 5);
+    let picture = |seed| ours(&Ask { side: 128, ..Ask::new(&spots[2], 2, seed) }, &|| true).pixels;
+    let (this, next) = (picture(0), picture(1));
+    assert!(next_seed("ours", &this, &next).holds());
+    assert!(!next_seed("the same", &this, &this).holds());
+    // A tenth of the pixels keep theirs.
+    let kept = this.iter().zip(&next).enumerate().map(|(i, (a, b))| if i % 10 == 0 { *a } else { *b });
+    assert!(!next_seed("a tenth is kept", &this, &kept.collect::<Vec<f64>>()).holds());
+    assert!(!next_seed("no noise at all", &[1.0; 64], &[1.0; 64]).holds());
+}
+
 /// What many do.
 #[derive(Clone, Default)]
 struct Single {
@@ -99,7 +115,8 @@ impl Accumulator for Single {
         }
     }
     fn count(&self) -> u64 {
-        self.counts.iter().map(|count| u64::from(*count)).sum()
+        // As who divides by it in single precision knows it.
+        self.counts.iter().sum::<u32>() as f32 as u64
     }
 }
 
@@ -143,8 +160,39 @@ fn sums_in_single_precision_are_found() {
     let checks = a_day::<Single>(1 << 24, 0);
     finds("a day", &checks);
     finds("change nothing", &checks);
+    finds("not counted", &checks);
     assert!(!poison::<Single>().holds());
     assert!(!poison::<Running>().holds());
+}
+
+#[test]
+fn poison_in_a_film_is_found() {
+    let said = |change: fn(&mut Vec<f64>, &mut [u64; 2])| {
+        poisoned_film(|stage: &mut Stage| {
+            let (mut pixels, mut counts) = exposed(stage);
+            change(&mut pixels, &mut counts);
+            (pixels, counts)
+        })
+    };
+    assert!(said(|_, _| ()).iter().all(Check::holds));
+    finds("spoilt", &said(|pixels, _| pixels[9] = f64::NAN));
+    // Left out in silence, or one of them let in.
+    finds("not counted", &said(|_, counts| counts[1] = 0));
+    finds("not counted", &said(|_, counts| counts[1] -= 1));
+}
+
+#[test]
+fn a_scene_that_makes_no_numbers_is_found() {
+    let make = |world: &mut World| {
+        let camera = (Camera::default(), Transform::default());
+        let camera = world.spawn(camera).id();
+        world.insert_resource(ActiveCamera(camera));
+        world.spawn((Light::Environment { radiance: Vec3::NAN }, Transform::default()));
+        Vec::new()
+    };
+    let source = SceneSource::Made(Made { name: "no number", make });
+    finds("dropped", &scenes(&trial(), [source].into_iter()));
+    finds("cannot be opened", &scenes(&trial(), [SceneSource::BuiltIn("nowhere")].into_iter()));
 }
 
 #[test]
@@ -205,7 +253,7 @@ fn another_film_is_found() {
     assert!(!differing("another seed", &in_passes(&bit_of_everything(1), 2, &[4]), &reference).holds());
     assert!(!differing("a sample more", &in_passes(&bit_of_everything(0), 2, &[5]), &reference).holds());
     let mut one = reference.clone();
-    one.tiles_mut()[3].pixels_mut()[5].add(0, glam::Vec3::splat(1e-9));
+    one.tiles_mut()[3].pixels_mut()[5].add(0, Vec3::splat(1e-9));
     assert_eq!(differing("one pixel", &one, &reference).ours, 1.0);
 }
 

@@ -1,16 +1,18 @@
 //! Surfaces, textures and transport that are a little wrong.
 
 use crate::{finds, trial};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DMat3, Vec2, Vec3, Vec4};
 use penumbra::image::Display;
 use penumbra::scene::color::srgb_from_linear;
 use penumbra::scene::{Encoding, Filter, Texture};
-use penumbra::torture::Check;
 use penumbra::torture::light::meter::no_light;
-use penumbra::torture::light::shading::{faceted_meridian, judge_meridian};
+use penumbra::torture::light::shading::{
+    PAPER, as_it_is, carried, faceted_meridian, flat_normals, judge_meridian, leak,
+};
 use penumbra::torture::light::surfaces::{all_surfaces, is_fine, tilted_mirrors};
 use penumbra::torture::light::textures::{coordinates, decoding, tone_maps};
 use penumbra::torture::light::transport::{all_the_same, no_more_than, on_average};
+use penumbra::torture::{Check, Place};
 use penumbra::trace::texture::lookup;
 
 #[test]
@@ -18,6 +20,27 @@ fn facets_that_shadow_each_other_are_found() {
     finds("largest step", &judge_meridian("facets", &faceted_meridian()));
     let up: Vec<f64> = (0..100).map(|i| if i == 50 { 1.0 } else { 1.0 - f64::from(i) / 100.0 }).collect();
     finds("wrong way", &judge_meridian("a bright line", &up));
+}
+
+#[test]
+fn light_that_leaks_around_paper_is_found() {
+    assert!(leak(Place::ORIGIN, PAPER).holds());
+    // Near its edges the cube's smooth surface is 0.35 further out, beyond the paper.
+    finds("behind paper", &[leak(Place::ORIGIN, PAPER - 0.35)]);
+    finds("flat normals", &[flat_normals(|normal| (normal + Vec3::X * 1e-4).normalize())]);
+}
+
+#[test]
+fn normal_maps_that_are_not_carried_along_are_found() {
+    assert!(carried(&trial(), as_it_is).iter().all(Check::holds));
+    // The other way across where the placement mirrors.
+    let mirrored = |matrix: &DMat3, strength: f32| {
+        let (tangent, strength) = as_it_is(matrix, strength);
+        (tangent.truncate().extend(matrix.determinant().signum() as f32), strength)
+    };
+    finds("cosine off", &carried(&trial(), mirrored));
+    // Height is scaled too, so nothing changes.
+    finds("cosine off", &carried(&trial(), |matrix, _| as_it_is(matrix, 1.0)));
 }
 
 #[test]
@@ -33,7 +56,9 @@ fn mirrors_that_are_not_mended_are_found() {
 #[test]
 fn a_surface_density_three_percent_wrong_is_found() {
     finds("χ²", &all_surfaces(&trial(), &|wi| if wi.x < 0.0 { 0.97 } else { 1.03 }));
-    finds("integral", &all_surfaces(&trial(), &|_| 1.01));
+    let checks = all_surfaces(&trial(), &|_| 1.01);
+    finds("integral", &checks);
+    finds("weight beside", &checks);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! C: cameras at their ends.
 
-use super::stage::{Stage, WIDE, bad_pixels, cube};
+use super::stage::{Stage, WIDE, bad_pixels, cube, means};
 use crate::bvh::{Isa, Ray};
 use crate::scene::{Light, Material, Projection, Transform};
 use crate::torture::oracle::Rng;
@@ -18,8 +18,8 @@ pub(super) const RAYS: Case = Case {
 pub(super) const PLACES: Case = Case {
     id: "C2",
     title: "eyes inside of a wall, on a face, on an edge, on a corner, up along the view",
-    limit: "no pixel is no number or below 0",
-    run: places,
+    limit: "no pixel is no number or below 0; as much sky is seen as there is",
+    run: |trial| places(trial, |eye, target, up| Transform::looking_at(eye, target, up).0),
 };
 
 const EPSILON: f64 = 0.5 * f32::EPSILON as f64;
@@ -101,22 +101,25 @@ fn direction(pose: &DAffine3, projection: Projection, point: Vec2, size: UVec2) 
     (m.x_axis * (x * half) + m.y_axis * (y * half) - m.z_axis).normalize()
 }
 
-/// Where an eye should not be, and what it looks at.
-const EYES: [(&str, DVec3, DVec3); 7] = [
-    ("inside", DVec3::new(0.1, 0.2, 0.3), DVec3::X),
-    ("on a face", DVec3::new(1.0, 0.2, 0.3), DVec3::NEG_X),
-    ("on a face, along it", DVec3::new(1.0, 0.2, 0.3), DVec3::Y),
-    ("on an edge", DVec3::new(1.0, 1.0, 0.3), DVec3::Z),
-    ("on a corner", DVec3::new(1.0, 1.0, 1.0), DVec3::NEG_ONE),
-    ("on a diagonal", DVec3::new(1.0, 0.25, 0.25), DVec3::NEG_X),
-    ("up along the view", DVec3::new(0.5, 3.0, 0.5), DVec3::NEG_Y),
+/// Where an eye should not be, what it looks at, and how much of its picture is sky: there may be less where rounding
+/// moves the eye into the cube.
+const EYES: [(&str, DVec3, DVec3, [f64; 2]); 7] = [
+    ("inside", DVec3::new(0.1, 0.2, 0.3), DVec3::X, [0.0, 0.0]),
+    ("on a face", DVec3::new(1.0, 0.2, 0.3), DVec3::NEG_X, [0.0, 0.0]),
+    ("on a face, along it", DVec3::new(1.0, 0.2, 0.3), DVec3::Y, [0.0, 0.6]),
+    ("on an edge", DVec3::new(1.0, 1.0, 0.3), DVec3::Z, [0.0, 0.85]),
+    ("on a corner", DVec3::new(1.0, 1.0, 1.0), DVec3::NEG_ONE, [0.0, 0.3]),
+    ("on a diagonal", DVec3::new(1.0, 0.25, 0.25), DVec3::NEG_X, [0.0, 0.0]),
+    ("up along the view", DVec3::new(0.5, 3.0, 0.5), DVec3::NEG_Y, [0.4, 0.7]),
 ];
 
-fn places(trial: &Trial<'_>) -> Vec<Check> {
+/// The case for whatever makes the place of a camera of its eye, its target and what is up.
+#[must_use]
+pub fn places(trial: &Trial<'_>, look: impl Fn(DVec3, DVec3, DVec3) -> DAffine3) -> Vec<Check> {
     let samples = trial.pick(1, 8, 256) as u32;
     let mut checks = Vec::new();
     for (number, place) in Place::ALL.into_iter().enumerate() {
-        for (name, eye, toward) in EYES {
+        for (name, eye, toward, [least, most]) in EYES {
             trial.tell(PLACES.id, name, number as f64 / Place::ALL.len() as f64);
             for isa in Isa::available() {
                 if trial.interrupted() {
@@ -126,11 +129,14 @@ fn places(trial: &Trial<'_>) -> Vec<Check> {
                 let material = Material { emission: glam::Vec3::splat(0.1), ..Material::default() };
                 stage.add_mesh(cube(), material, DAffine3::IDENTITY);
                 stage.add(Light::Environment { radiance: glam::Vec3::ONE }, DAffine3::IDENTITY);
-                stage.look(eye, eye + toward, DVec3::Y, WIDE);
+                stage.look_from(look(eye, eye + toward, DVec3::Y), WIDE);
                 let film = stage.picture(samples);
                 let what = format!("{name}, {}, {}", place.name(), isa.name());
                 let pixels = u64::from(film.size().element_product());
-                checks.push(Check::none(what, pixels, "pixels", bad_pixels(&film)));
+                let sky = means(&film).iter().filter(|mean| **mean == DVec3::ONE).count();
+                let is_there = (least..=most).contains(&(sky as f64 / pixels as f64));
+                let bad = bad_pixels(&film) + u64::from(!is_there);
+                checks.push(Check::none(what, pixels, "pixels", bad));
             }
         }
     }

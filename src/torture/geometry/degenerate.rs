@@ -6,8 +6,10 @@ use super::meshes::{Triangles, soup};
 use super::stage::{Stage, WIDE, bad_pixels, ball, cube, means};
 use crate::bvh::{Isa, Ray};
 use crate::scene::{Light, Material, TriangleMesh};
+use crate::torture::light::meter::larger;
 use crate::torture::oracle::Rng;
 use crate::torture::{Case, Check, Place, Trial};
+use crate::trace::surface::Interaction;
 use glam::{DAffine3, DVec3, Vec3};
 
 pub(super) const CASE: Case = Case {
@@ -15,14 +17,15 @@ pub(super) const CASE: Case = Case {
     title: "slivers, triangles without area, 40 orders of magnitude, denormal numbers",
     limit: "the normal of a sliver is within 1e-6; no pixel is no number or below 0",
     run: |trial| {
-        let mut checks = normals();
+        let mut checks = normals(|at, _| [at.geometric_normal, at.normal]);
         checks.extend(pictures(trial, &scenes()));
         checks
     },
 };
 
-/// A million long, a millionth wide, at the three scales.
-fn normals() -> Vec<Check> {
+/// A million long, a millionth wide, at the three scales: for whatever makes both normals of a place and the corners.
+#[must_use]
+pub fn normals(normals: impl Fn(&Interaction, [Vec3; 3]) -> [Vec3; 2]) -> Vec<Check> {
     let mut checks = Vec::new();
     for place in Place::ALL.into_iter().filter(|place| place.shift == 0.0) {
         let corners = [Vec3::ZERO, Vec3::new(1e6, 0.0, 0.0), Vec3::new(5e5, 1e-6, 0.0)];
@@ -34,11 +37,10 @@ fn normals() -> Vec<Check> {
                 let ray = Ray::new(from, Vec3::new(0.0, 0.0, -side));
                 let Some(hit) = tracer.closest_hit(&ray) else { return f64::NAN };
                 let at = alone.at(&hit, &ray);
-                let off = [at.geometric_normal, at.normal].map(|n| (n - Vec3::Z * side).length());
-                f64::from(off[0].max(off[1]))
+                let off = normals(&at, corners).map(|n| f64::from((n - Vec3::Z * side).length()));
+                larger(off[0], off[1])
             });
-            let worst = if off[0] >= off[1] { off[0] } else { off[1] };
-            let worst = if off.iter().any(|x| x.is_nan()) { f64::NAN } else { worst };
+            let worst = larger(off[0], off[1]);
             let what = format!("off in the normal of a sliver, {}, {name}", place.name());
             checks.push(Check::new(what, 2, "rays", worst, 1e-6));
         }

@@ -56,7 +56,12 @@ impl Stage {
 
     /// A camera.
     pub fn look(&mut self, eye: DVec3, target: DVec3, up: DVec3, projection: Projection) {
-        let entity = self.add(Camera { projection }, Transform::looking_at(eye, target, up).0);
+        self.look_from(Transform::looking_at(eye, target, up).0, projection);
+    }
+
+    /// A camera at a place, toward its −Z.
+    pub fn look_from(&mut self, place: DAffine3, projection: Projection) {
+        let entity = self.add(Camera { projection }, place);
         self.app.world.insert_resource(ActiveCamera(entity));
     }
 

@@ -17,7 +17,7 @@ pub(super) const CASE: Case = Case {
     limit: "the lowest index, for 1, 2 and 8 threads and any builder; pictures equal to the bit",
     run: |trial| {
         let mut checks = run(trial, &ours());
-        checks.extend(floors(trial));
+        checks.extend(floors(trial, floor));
         checks
     },
 };
@@ -94,15 +94,17 @@ fn into_square(rng: &mut Rng, place: Place) -> Ray {
 }
 
 /// A room whose floor is there once, or a second time in another colour: as another face of the same mesh, or as
-/// an instance of its own.
-fn floors(trial: &Trial<'_>) -> Vec<Check> {
+/// an instance of its own. For whatever makes a picture as [`floor`] does.
+#[must_use]
+pub fn floors(
+    trial: &Trial<'_>,
+    floor: impl Fn(&[&[Vec3]], usize, Place, u32) -> Option<Film>,
+) -> Vec<Check> {
     let (red, green) = (Vec3::new(0.8, 0.1, 0.1), Vec3::new(0.1, 0.8, 0.1));
     let samples = trial.pick(2, 4, 256) as u32;
     let mut checks = Vec::new();
     for place in Place::ALL {
-        let picture = |meshes: &[&[Vec3]], threads: usize| {
-            with_threads(threads, || floor(meshes, place.transform(), samples))
-        };
+        let picture = |meshes: &[&[Vec3]], threads: usize| floor(meshes, threads, place, samples);
         let (is_red, is_green) = (picture(&[&[red]], 1), picture(&[&[green]], 1));
         let both = picture(&[&[red], &[green]], 1);
         let mut wrong = u64::from(is_red == is_green) + u64::from(both != is_red && both != is_green);
@@ -119,9 +121,10 @@ fn floors(trial: &Trial<'_>) -> Vec<Check> {
     checks
 }
 
-/// Each list of colours is a mesh of coincident floors.
-fn floor(meshes: &[&[Vec3]], place: DAffine3, samples: u32) -> Film {
-    let mut stage = Stage::new(40, 30, place);
+/// Each list of colours is a mesh of coincident floors. `None` if there are no such threads.
+#[must_use]
+pub fn floor(meshes: &[&[Vec3]], threads: usize, place: Place, samples: u32) -> Option<Film> {
+    let mut stage = Stage::new(40, 30, place.transform());
     let white = Material { double_sided: true, ..Material::lambert(Vec3::splat(0.7)) };
     stage.add_mesh(cube(), white, DAffine3::from_translation(DVec3::Y));
     stage.add(Light::Point { intensity: Vec3::ONE }, DAffine3::from_translation(DVec3::Y * 1.5));
@@ -133,5 +136,5 @@ fn floor(meshes: &[&[Vec3]], place: DAffine3, samples: u32) -> Film {
         stage.add_painted(floor, materials, DAffine3::IDENTITY);
     }
     stage.look(DVec3::new(0.2, 1.4, 0.9), DVec3::new(0.0, 0.2, 0.0), DVec3::Y, WIDE);
-    stage.picture(samples)
+    with_threads(threads, || stage.picture(samples))
 }

@@ -85,34 +85,49 @@ pub fn kinds(many: usize) -> Vec<(&'static str, Triangles)> {
     ]
 }
 
-/// The faster of two builds: machines are shared.
-fn build(triangles: &[[Vec3; 3]]) -> (Blas, f64) {
-    let timed = || {
+/// Times to build, beside that of the first kind: the faster of two, for machines are shared.
+#[must_use]
+pub fn times<T>(
+    trial: &Trial<'_>,
+    kinds: &[(&'static str, Triangles)],
+    build: impl Fn(&[[Vec3; 3]]) -> T,
+) -> Vec<Check> {
+    let timed = |triangles: &Triangles| {
         let start = Instant::now();
-        let blas = Blas::build(triangles);
-        (blas, start.elapsed().as_secs_f64())
+        let built = build(triangles);
+        let seconds = start.elapsed().as_secs_f64();
+        drop(built);
+        seconds
     };
-    let (first, second) = (timed(), timed());
-    if first.1 < second.1 { first } else { second }
+    let mut random = None;
+    let check = |(name, triangles): &(&'static str, Triangles)| {
+        trial.tell(CASE.id, *name, 0.0);
+        let seconds = timed(triangles).min(timed(triangles));
+        let beside = seconds / *random.get_or_insert(seconds);
+        let what = format!("time to build, of random: {name}");
+        Check::new(what, triangles.len() as u64, "triangles", beside, 3.0)
+    };
+    kinds.iter().take_while(|_| !trial.interrupted()).map(check).collect()
+}
+
+/// Whether a hierarchy over `n` triangles is no deeper than it may be.
+#[must_use]
+pub fn shallow(what: &str, n: u64, hierarchy: &WideBvh) -> Check {
+    let most = (2.0 * (n as f64).log2() + 40.0).min(MAX_DEPTH as f64);
+    Check::new(format!("depth: {what}"), n, "triangles", depth(hierarchy) as f64, most)
 }
 
 fn run(trial: &Trial<'_>) -> Vec<Check> {
     let many = trial.pick(20_000, 40_000, 1_000_000) as usize;
     let mut checks = Vec::new();
-    let mut random = f64::NAN;
     let kinds = kinds(many);
+    // Seconds are short, and shared with other tests.
+    if trial.effort != Effort::Quick {
+        checks.extend(times(trial, &kinds, Blas::build));
+    }
     for (number, (name, triangles)) in kinds.iter().enumerate() {
         trial.tell(CASE.id, *name, number as f64 / kinds.len() as f64);
-        let (blas, seconds) = build(triangles);
-        if *name == "random" {
-            random = seconds;
-        }
-        let n = triangles.len() as u64;
-        // Seconds are short, and shared with other tests.
-        if trial.effort != Effort::Quick {
-            let what = format!("time to build, of random: {name}");
-            checks.push(Check::new(what, n, "triangles", seconds / random, 3.0));
-        }
+        let blas = Blas::build(triangles);
         let whole = u64::from(check(&blas, triangles).is_err());
         checks.push(Check::none(
             format!("nodes: {name}"),
@@ -120,15 +135,8 @@ fn run(trial: &Trial<'_>) -> Vec<Check> {
             "nodes",
             whole,
         ));
-        let most = (2.0 * (n as f64).log2() + 40.0).min(MAX_DEPTH as f64);
-        let depth = depth(blas.hierarchy()) as f64;
-        checks.push(Check::new(
-            format!("depth: {name}, cost {:.1}", blas.cost()),
-            n,
-            "triangles",
-            depth,
-            most,
-        ));
+        let what = format!("{name}, cost {:.1}", blas.cost());
+        checks.push(shallow(&what, triangles.len() as u64, blas.hierarchy()));
         let tracers: Vec<(&str, Blas)> =
             Isa::available().into_iter().map(|isa| (isa.name(), blas.clone().with_isa(isa))).collect();
         checks.extend(hits(trial, name, triangles, &tracers));

@@ -166,6 +166,21 @@ pub fn neighbours(what: &str, side: usize, pixels: &[f64]) -> Check {
     Check::new(format!("{what}: correlation"), n as u64, "pixels", worst, 5.0 / n.sqrt())
 }
 
+/// Correlation of what is wrong in pixels of a flat picture with that in the same pixels by the next seed.
+#[must_use]
+pub fn next_seed(what: &str, this: &[f64], next: &[f64]) -> Check {
+    let n = this.len() as f64;
+    let off = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / n;
+        values.iter().map(|x| x - mean).collect::<Vec<f64>>()
+    };
+    let (a, b) = (off(this), off(next));
+    let sum = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+    let correlation = sum(&a, &b) / (sum(&a, &a) * sum(&b, &b)).sqrt();
+    let what = format!("{what}, with the next seed: correlation");
+    Check::new(what, n as u64, "pixels", correlation.abs(), 5.0 / n.sqrt())
+}
+
 fn correlation(trial: &Trial<'_>) -> Vec<Check> {
     // The middle of a penumbra: all pixels show the same.
     let spots = penumbra(1.0, 5);
@@ -181,14 +196,7 @@ fn correlation(trial: &Trial<'_>) -> Vec<Check> {
             return checks;
         }
         checks.push(neighbours(&format!("{samples} samples"), side as usize, &this));
-        // The next seed's noise is another.
-        let n = this.len() as f64;
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / n;
-        let (a, b) = (mean(&this), mean(&next));
-        let sum = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - a) * (y - b)).sum::<f64>();
-        let correlation = sum(&this, &next) / (sum(&this, &this) * sum(&next, &next)).sqrt();
-        let what = format!("{samples} samples, with the next seed: correlation");
-        checks.push(Check::new(what, n as u64, "pixels", correlation.abs(), 5.0 / n.sqrt()));
+        checks.push(next_seed(&format!("{samples} samples"), &this, &next));
         trial.tell("S4", format!("{samples} samples"), 0.5);
     }
     checks

@@ -105,9 +105,9 @@ fn terminator(trial: &Trial<'_>) -> Vec<Check> {
                 checks.extend(judge_meridian(&what, &shade));
             }
         }
-        checks.push(leak(place));
+        checks.push(leak(place, PAPER));
     }
-    checks.push(flat_normals());
+    checks.push(flat_normals(|normal| normal));
     checks
 }
 
@@ -117,13 +117,17 @@ pub fn faceted_meridian() -> Vec<f64> {
     meridian(icosphere(), Integrator::Direct, Place::ORIGIN)
 }
 
+/// Where the paper is before a cube that ends at 1.
+pub const PAPER: f32 = 1.001;
+
 /// A wall of paper a hair away from the side of a cube with smoothed normals, between it and the sun: nothing leaks
-/// around it.
-fn leak(place: Place) -> Check {
+/// around it. Who starts rays beyond the paper sees it so much nearer to the cube's middle.
+#[must_use]
+pub fn leak(place: Place, paper: f32) -> Check {
     let shift = DVec3::splat(place.shift);
     let mut stage = Stage::placed(settings(64, 64, Integrator::Direct, 1), place.scale, shift);
     stage.add_mesh(smooth(cube()), Material::lambert(Vec3::ONE), HERE);
-    let paper = quad(Vec3::new(1.001, -4.0, -4.0), Vec3::Y * 8.0, Vec3::Z * 8.0);
+    let paper = quad(Vec3::new(paper, -4.0, -4.0), Vec3::Y * 8.0, Vec3::Z * 8.0);
     stage.add_mesh(paper, Material::lambert(Vec3::ZERO), HERE);
     sun(&mut stage, DVec3::new(1.0, 0.2, 0.1));
     stage.look(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::X, 1.9);
@@ -132,15 +136,16 @@ fn leak(place: Place) -> Check {
     Check::none(format!("lit behind paper, {}", place.name()), 64 * 64, "pixels", lit)
 }
 
-/// A mesh whose normals are those of its facets looks as one that has none.
-fn flat_normals() -> Check {
+/// A mesh whose normals are those of its facets looks as one that has none; `seen` makes of them those that are seen.
+#[must_use]
+pub fn flat_normals(seen: impl Fn(Vec3) -> Vec3) -> Check {
     let plain = cube();
     let mut told = TriangleMesh::default();
     for triangle in 0..plain.triangles.len() {
         let [a, b, c] = plain.corners(triangle);
         let first = told.positions.len() as u32;
         told.positions.extend([a, b, c]);
-        told.normals.extend([(b - a).cross(c - a).normalize(); 3]);
+        told.normals.extend([seen((b - a).cross(c - a).normalize()); 3]);
         told.triangles.push([first, first + 1, first + 2]);
     }
     let picture = |mesh: TriangleMesh| {
@@ -234,8 +239,16 @@ fn mapped(texel: [u8; 4], scale: f32, tangent: Vec4, uvs: [Vec2; 4], place: DAff
 
 const UVS: [Vec2; 4] = [Vec2::new(0.0, 1.0), Vec2::ONE, Vec2::new(1.0, 0.0), Vec2::ZERO];
 
-/// The normal that a mapped square is shaded by, as suns see it: off the exact one by.
-fn carried(trial: &Trial<'_>) -> Vec<Check> {
+/// The tangent along u and the strength, as they are.
+#[must_use]
+pub fn as_it_is(_: &DMat3, strength: f32) -> (Vec4, f32) {
+    (Vec4::new(1.0, 0.0, 0.0, 1.0), strength)
+}
+
+/// The normal that a mapped square is shaded by, as suns see it: off the exact one by. `told` makes the tangent and
+/// strength that are used of how the square is placed and of the true strength.
+#[must_use]
+pub fn carried(trial: &Trial<'_>, told: impl Fn(&DMat3, f32) -> (Vec4, f32)) -> Vec<Check> {
     let texel = [178, 153, 230, 255];
     let n = (Vec3::new(178.0, 153.0, 230.0) / 255.0 * 2.0 - 1.0).as_dvec3();
     let turn = DMat3::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 0.8);
@@ -246,6 +259,7 @@ fn carried(trial: &Trial<'_>) -> Vec<Check> {
         DVec3::new(-1.0, 1.0, 1.0),
         DVec3::new(1.0, -1.0, 1.0),
         DVec3::new(2.0, 2.0, -2.0),
+        DVec3::new(3.0, 1.0, 0.2),
         DVec3::splat(1e-3),
     ] {
         for strength in [1.0f32, 0.5, 0.0] {
@@ -257,12 +271,12 @@ fn carried(trial: &Trial<'_>) -> Vec<Check> {
                 let expected = (axis(DVec3::X) * n.x * tilt + axis(DVec3::Y) * n.y * tilt + out * n.z)
                     .normalize()
                     * side;
-                let tangent = Vec4::new(1.0, 0.0, 0.0, 1.0);
+                let (tangent, told) = told(&matrix, strength);
                 // A sun from near the normal itself: irradiance is the cosine.
                 for toward in [expected, (expected + out.any_orthonormal_vector() * 0.2).normalize()] {
                     let place = DAffine3::from_mat3(matrix);
                     let eye = out * side * 3.0 * scale.x.abs();
-                    let mut stage = mapped(texel, strength, tangent, UVS, place, eye);
+                    let mut stage = mapped(texel, told, tangent, UVS, place, eye);
                     sun(&mut stage, toward);
                     let (film, _) = stage.expose(1, || true);
                     let cosine = toward.dot(expected);
@@ -331,5 +345,5 @@ pub const H4: Case = Case {
     id: "H4",
     title: "normal maps: carried along by placements; without directions, no harm",
     limit: "1e-5; 0 black pixels",
-    run: |trial| [carried(trial), odd_maps(trial)].concat(),
+    run: |trial| [carried(trial, as_it_is), odd_maps(trial)].concat(),
 };

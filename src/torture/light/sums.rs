@@ -157,8 +157,10 @@ pub fn poison<A: Accumulator>() -> Check {
     Check::none("let in", bad.len() as u64 + 2, "samples", wrong)
 }
 
-/// A light of no number: each of its samples is dropped and counted, and no pixel is spoilt.
-fn poisoned_film() -> Vec<Check> {
+/// A light of no number: each of its samples is dropped and counted, and no pixel is spoilt. `exposed` makes pixels of
+/// the stage, and counts samples taken and dropped.
+#[must_use]
+pub fn poisoned_film(exposed: impl Fn(&mut Stage) -> (Vec<f64>, [u64; 2])) -> Vec<Check> {
     let mut stage = Stage::new(settings(8, 8, Integrator::Direct, 1));
     let here = DAffine3::IDENTITY;
     stage.add_mesh(quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0), Default::default(), here);
@@ -166,17 +168,25 @@ fn poisoned_film() -> Vec<Check> {
     stage.add(Light::Point { intensity: Vec3::splat(f32::NAN) }, beside(1.0));
     stage.add(Light::Point { intensity: Vec3::ONE }, beside(-1.0));
     stage.look(DVec3::Z * 0.4, DVec3::ZERO, DVec3::Y, 0.5);
-    let (film, rays) = stage.expose(4, || true);
+    let (pixels, [taken, dropped]) = exposed(&mut stage);
     vec![
-        no_light("pixels spoilt by a light of no number", &reds(&film), false),
-        Check::none("such samples not counted", rays.camera, "samples", rays.camera - film.dropped()),
+        no_light("pixels spoilt by a light of no number", &pixels, false),
+        Check::none("such samples not counted", taken, "samples", taken.abs_diff(dropped)),
     ]
 }
 
-/// All scenes that come with the program, small.
-fn all_built_in(trial: &Trial<'_>) -> Vec<Check> {
+/// The film's.
+#[must_use]
+pub fn exposed(stage: &mut Stage) -> (Vec<f64>, [u64; 2]) {
+    let (film, rays) = stage.expose(4, || true);
+    (reds(&film), [rays.camera, film.dropped()])
+}
+
+/// Scenes, small: none of their samples is no number, none of their pixels no light.
+#[must_use]
+pub fn scenes(trial: &Trial<'_>, sources: impl Iterator<Item = SceneSource>) -> Vec<Check> {
     let mut checks = Vec::new();
-    for scene in built_in_scenes() {
+    for source in sources {
         if trial.interrupted() {
             break;
         }
@@ -186,9 +196,8 @@ fn all_built_in(trial: &Trial<'_>) -> Vec<Check> {
             ..Wishes::default()
         };
         let samples = trial.pick(4, 64, 4096) as u32;
-        let source = SceneSource::BuiltIn(scene.name);
         let Ok(mut opened) = open(&source, &LoadOptions::default(), &wishes) else {
-            checks.push(Check::none(format!("{} cannot be opened", scene.name), 1, "scenes", 1));
+            checks.push(Check::none(format!("{} cannot be opened", source.name()), 1, "scenes", 1));
             continue;
         };
         {
@@ -200,7 +209,7 @@ fn all_built_in(trial: &Trial<'_>) -> Vec<Check> {
         let tried = u64::from(samples) * 48 * 32;
         checks.push(Check::none("samples dropped of built-in scenes", tried, "samples", film.dropped()));
         checks.push(no_light("pixels of built-in scenes that are no light", &reds(film), false));
-        trial.tell("S8", scene.name, 0.5);
+        trial.tell("S8", source.name(), 0.5);
     }
     super::meter::worst_of_each(checks.into_iter())
 }
@@ -220,8 +229,8 @@ pub const S8: Case = Case {
     limit: "0",
     run: |trial| {
         let mut checks = vec![poison::<Pixel>()];
-        checks.extend(poisoned_film());
-        checks.extend(all_built_in(trial));
+        checks.extend(poisoned_film(exposed));
+        checks.extend(scenes(trial, built_in_scenes().iter().map(|scene| SceneSource::BuiltIn(scene.name))));
         checks
     },
 };

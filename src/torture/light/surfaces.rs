@@ -125,19 +125,19 @@ fn one_surface(
     wrong: &dyn Fn(Vec3) -> f64,
 ) -> Vec<Check> {
     let seen = Seen::new(material, toward(degrees).as_vec3());
+    let density = |wi: Vec3| f64::from(seen.bsdf().pdf(wi, Lobes::ALL)) * wrong(wi);
     let mut off = 0.0;
     let propose = |rng: &mut Rng| {
         let bsdf = seen.bsdf();
         let sample = bsdf.sample(rng.unit(), rng.pair(), Lobes::ALL)?;
         // The weight is value over density, and what is asked is what was said.
-        let pdf = bsdf.pdf(sample.wi, Lobes::ALL);
+        let pdf = density(sample.wi) as f32;
         let [diffuse, glossy] = bsdf.eval(sample.wi);
         let value = diffuse + glossy;
         let beside = (sample.weight * pdf - value).abs().max_element() / value.max_element();
         off = larger(off, f64::from(if sample.pdf == Some(pdf) { beside } else { f32::INFINITY }));
         Some(sample.wi)
     };
-    let density = |wi: Vec3| f64::from(seen.bsdf().pdf(wi, Lobes::ALL)) * wrong(wi);
     let what = format!("{name} at {degrees}°");
     // Lobes near the horizon are narrow.
     let draws = Draws { fine: if degrees > 89.0 { 1024 } else { draws.fine }, ..draws };
