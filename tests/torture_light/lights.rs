@@ -2,13 +2,17 @@
 
 use crate::{finds, trial};
 use glam::DVec3;
-use penumbra::torture::light::lamps::{cut_by_the_horizon, quads, touching_the_floor};
-use penumbra::torture::light::meter::{Ask, Meter, Plan, Reading, measure, ours};
+use penumbra::torture::light::lamps::{
+    balls, cut_by_the_horizon, edge_on, far, huge, inside_a_ball, lines, quads, touching_the_floor, triangles,
+};
+use penumbra::torture::light::meter::{Ask, Meter, Plan, Reading, judge, measure, ours};
 use penumbra::torture::light::oracle;
 use penumbra::torture::light::pictures::fireflies;
-use penumbra::torture::light::remedies::{choice, densities, solid_angles};
-use penumbra::torture::light::rooms::{awkward_places, judge_form_factor, squares};
-use penumbra::torture::light::shadows::penumbra;
+use penumbra::torture::light::remedies::{
+    choice, densities, either_side_of_a_switch, solid_angles, unlike_lights,
+};
+use penumbra::torture::light::rooms::{awkward_places, in_a_shining_cube, judge_form_factor, squares};
+use penumbra::torture::light::shadows::{penumbra, shadows_of_a_line};
 use penumbra::torture::light::spot::{Expected, Spot, Thing};
 use penumbra::torture::oracle::Rng;
 use penumbra::torture::{Check, Place};
@@ -67,11 +71,54 @@ fn half_a_percent_more_light_is_found() {
     finds("computed", &judged(&quads(), &|ask| but(ask, |_, pixel| pixel * 1.000_05)));
 }
 
+/// Half a percent more than is right, light where it is dark, other light where it should be the same, no number where
+/// any would do: no spot of any list is so wide that it lets that pass.
+#[test]
+fn every_spot_has_a_limit() {
+    let lists = [
+        [quads(), triangles(), cut_by_the_horizon(), touching_the_floor(), edge_on(), far()].concat(),
+        [huge(), balls(), inside_a_ball(), lines(), fireflies(), unlike_lights()].concat(),
+        [penumbra(1.0, 11), penumbra(1e-3, 11), shadows_of_a_line()].concat(),
+        [in_a_shining_cube(), awkward_places(), either_side_of_a_switch()].concat(),
+    ];
+    let off = |ask: &Ask| {
+        let exact = |exact: f64| if exact == 0.0 { 1e-9 } else { exact * 1.005 };
+        let pixel = match &ask.spot.expected {
+            Expected::Value { exact: of, .. } => exact(of(ask.spot.point)),
+            Expected::Dark => 1e-30,
+            Expected::Same(_) => 0.0,
+            Expected::Finite => f64::NAN,
+        };
+        let noise = |i: i32| 1.0 + 1e-6 * f64::from(i % 3 - 1);
+        let pixels = (0..256).map(|i| pixel * noise(i)).collect();
+        Reading { pixels, samples: 256, dropped: 0, shadow_rays: u64::from(!ask.computed) }
+    };
+    let mut deaf = Vec::new();
+    let spots = lists.concat();
+    for (spot, place) in spots.iter().flat_map(|spot| Place::ALL.map(|place| (spot, place))) {
+        for computed in [false, true].into_iter().take(1 + usize::from(spot.computed)) {
+            let ask = Ask { place, computed, ..Ask::new(spot, 1, 0) };
+            let same = match &spot.expected {
+                Expected::Same(other) => Some(off(&Ask { spot: other, ..ask })),
+                _ => None,
+            };
+            let checks = judge(&spot.name, &ask, &off(&ask), same.as_ref());
+            if checks.iter().all(Check::holds) {
+                deaf.push(format!("{}, {}", spot.name, place.name()));
+            }
+        }
+    }
+    println!("{} of {} do not notice: {deaf:#?}", deaf.len(), 5 * spots.len());
+    assert!(deaf.is_empty());
+}
+
 #[test]
 fn a_density_one_percent_wrong_is_found() {
     let checks = judged(&quads(), &|ask| but(ask, |_, pixel| pixel / 1.01));
     finds("standard errors off", &checks);
-    finds("integral", &densities(&trial(), &|_| 1.01));
+    let checks = densities(&trial(), &|_| 1.01);
+    finds("integral", &checks);
+    finds("of its ray", &checks);
     finds("χ²", &densities(&trial(), &|wi| if wi.x < 0.3 { 0.97 } else { 1.03 }));
 }
 

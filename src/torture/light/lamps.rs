@@ -73,7 +73,8 @@ pub fn touching_the_floor() -> Vec<Spot> {
     [1.0, 0.1, 0.01, 1e-4, 1e-6]
         .map(|x| {
             let light = [v(0.0, -1.0, 0.0), DVec3::Y * 2.0, DVec3::Z];
-            Spot::under(format!("from {x}"), v(x, 0.0, 0.0), UP, light).half(x.min(0.25) * 0.5)
+            let spot = Spot::under(format!("from {x}"), v(x, 0.0, 0.0), UP, light).half(x.min(0.25) * 0.5);
+            if x < 0.01 { spot.in_double_precision() } else { spot }
         })
         .to_vec()
 }
@@ -85,7 +86,8 @@ pub fn edge_on() -> Vec<Spot> {
         .map(|d: f64| {
             let light = [v(0.0, -0.5, 1.0), DVec3::Y, DVec3::Z];
             let half = if d == 0.0 { 1e-6 } else { d.min(1.0) };
-            Spot::under(format!("{d} off its plane"), v(d, 0.0, 0.0), UP, light).half(half)
+            let spot = Spot::under(format!("{d} off its plane"), v(d, 0.0, 0.0), UP, light).half(half);
+            if d < 0.01 { spot.in_double_precision() } else { spot }
         })
         .to_vec()
 }
@@ -96,7 +98,8 @@ pub fn far() -> Vec<Spot> {
     [10.0, 1e3, 1e4, 1e6]
         .map(|h| {
             let light = [v(-0.5, -0.5, h), DVec3::X, DVec3::Y];
-            Spot::under(format!("height {h:e}"), DVec3::ZERO, UP, light)
+            let spot = Spot::under(format!("height {h:e}"), DVec3::ZERO, UP, light);
+            if h > 50.0 { spot.in_double_precision() } else { spot }
         })
         .to_vec()
 }

@@ -214,17 +214,17 @@ pub fn densities(trial: &Trial<'_>, wrong: &(dyn Fn(Vec3) -> f64 + Sync)) -> Vec
             return Vec::new();
         }
         let (mut far_off, mut asked) = (0.0f64, 0);
+        let density = |wi: Vec3| (sampled.density)(wi) * wrong(wi);
         let sample = |rng: &mut Rng| {
             let sample = sampled.light.sample(sampled.from, Vec3::Z, rng.pair())?;
             // What a sample says is what a ray finds; at the very rim rounding may let the ray pass.
-            let (said, found) = (f64::from(sample.pdf?), (sampled.density)(sample.wi));
+            let (said, found) = (f64::from(sample.pdf?), density(sample.wi));
             if found != 0.0 {
                 asked += 1;
                 far_off = larger(far_off, (said / found - 1.0).abs());
             }
             Some(sample.wi)
         };
-        let density = |wi| (sampled.density)(wi) * wrong(wi);
         let mut checks = compare(&sampled.name, draws, sample, density, &sampled.map);
         let what = format!("{}: a sample's density and that of its ray, relative", sampled.name);
         checks.push(Check::new(what, asked, "samples", far_off, 2e-3));

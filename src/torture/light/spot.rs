@@ -160,6 +160,16 @@ impl Spot {
         self
     }
 
+    /// Of which no more is rounded than the sum: where terms are much larger than that, light is computed in double
+    /// precision. A limit by single precision's terms would let black pass.
+    #[must_use]
+    pub fn in_double_precision(mut self) -> Self {
+        if let Expected::Value { exact, condition, .. } = &mut self.expected {
+            *condition = Arc::clone(exact);
+        }
+        self
+    }
+
     /// Side of the picture of it: a few units in the last place of the receiver.
     #[must_use]
     pub fn picture(&self) -> f64 {
