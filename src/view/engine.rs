@@ -23,6 +23,7 @@ use crate::shown::Shown;
 use crate::sync::Redone;
 use crate::trace::Viewpoint;
 use bevy_ecs::prelude::*;
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -148,24 +149,30 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         let mut files = self.watch(&app);
         let mut view_changed_at = Instant::now();
         let mut idle = false;
+        let mut waiting = VecDeque::new();
         loop {
             let mut asked = None;
-            let mut commands = Vec::new();
             if idle {
                 // No CPU at all until the user does something, or files do.
                 match files.wait(&self.commands) {
-                    Ok(command) => commands.push(command),
+                    Ok(command) => waiting.push_back(command),
                     Err(RecvTimeoutError::Timeout) => {}
                     Err(RecvTimeoutError::Disconnected) => return,
                 }
             }
             // Lowered before the commands are read: one that comes later raises it again.
             self.interrupt.store(false, Ordering::SeqCst);
-            commands.extend(self.commands.try_iter());
+            waiting.extend(self.commands.try_iter());
+            if waiting.iter().any(|command| matches!(command, Command::Quit)) {
+                return;
+            }
+            let commands = of_one_frame(&mut waiting);
+            if !waiting.is_empty() {
+                self.interrupt.store(true, Ordering::SeqCst);
+            }
             let mut wanted = None;
             for command in commands {
                 match command {
-                    Command::Quit => return,
                     Command::Open(path) => wanted = Some(Some(path)),
                     Command::FilesChanged => files.look(),
                     Command::Tap { press, .. } if press.tap == Tap::Reload => wanted = Some(None),
@@ -379,6 +386,18 @@ impl Files {
             None => commands.recv().map_err(|_| RecvTimeoutError::Disconnected),
         }
     }
+}
+
+/// Takes what the next frame does. Its systems have an order of their own: what a key does shall come after all that the
+/// user did before, so a key waits for a frame of its own, with its repetitions.
+fn of_one_frame(waiting: &mut VecDeque<Command>) -> Vec<Command> {
+    let first = match waiting.front() {
+        Some(Command::Tap { press, .. }) => Some(press.tap),
+        _ => None,
+    };
+    let waits = |command: &Command| matches!(command, Command::Tap { press, .. } if Some(press.tap) != first);
+    let count = waiting.iter().skip(1).position(waits).map_or(waiting.len(), |others| others + 1);
+    waiting.drain(..count).collect()
 }
 
 /// Applies `command`; the first question for another view is remembered in `asked`.

@@ -97,11 +97,13 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             (change_pause, advance).chain(),
             (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
             (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
-            (remember, print_camera, choose_pixel_view, change_debug, edit_scene).chain(),
+            (choose_pixel_view, change_debug, edit_scene).chain(),
         )
             .chain()
             .in_set(FrameSystems::Input),
     );
+    // Where the camera is now, not where it was before it moved.
+    app.add_systems((remember, print_camera).chain().in_set(FrameSystems::Sync));
     app.add_systems(refine_first_hits.in_set(FrameSystems::Trace).after(trace_frame));
     app.add_systems(start_sync.in_set(FrameSystems::Sync).before(build_blas));
     app.add_systems((finish_sync, mark).chain().in_set(FrameSystems::Sync).after(reset_film));

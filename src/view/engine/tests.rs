@@ -1,13 +1,13 @@
 //! The engine without a window.
 
-use super::super::input::Press;
+use super::super::input::{Drag, Press};
 use super::super::keymap::Hold;
 use super::*;
 use crate::app::FrameSystems;
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{Wishes, open};
 use bevy_ecs::prelude::{IntoScheduleConfigs, Res};
-use glam::UVec2;
+use glam::{DVec2, UVec2};
 use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 
@@ -94,4 +94,45 @@ fn an_interrupt_that_comes_late_keeps_no_picture_back() {
     }
     commands.send(Command::Quit).unwrap();
     engine.join().unwrap();
+}
+
+#[test]
+fn keys_between_two_frames_act_in_their_order() {
+    let at = Instant::now();
+    let tap = |tap: Tap| Command::Tap { press: tap.into(), at };
+    let drag = || Command::Drag { drag: Drag::Pan, pixels: DVec2::ONE, at };
+    let held = || Command::Held { held: [false; Hold::COUNT], at };
+    // How many commands each frame takes.
+    let frames = |commands: Vec<Command>| {
+        let mut waiting = VecDeque::from(commands);
+        let counts = std::iter::from_fn(|| Some(of_one_frame(&mut waiting).len()).filter(|&count| count > 0));
+        counts.collect::<Vec<usize>>()
+    };
+    assert!(frames(vec![]).is_empty());
+    assert_eq!(frames(vec![tap(Tap::FrameAll), tap(Tap::ResetCamera), tap(Tap::FrameAll)]), [1, 1, 1]);
+    assert_eq!(frames(vec![tap(Tap::Brighter), tap(Tap::Brighter), tap(Tap::Darker), drag()]), [2, 2]);
+    assert_eq!(frames(vec![held(), drag(), drag(), tap(Tap::PrintCamera), held()]), [3, 2]);
+}
+
+#[test]
+fn a_camera_that_is_copied_or_remembered_is_where_it_has_moved_to() {
+    let source = SceneSource::parse("cornell").unwrap();
+    let wishes = Wishes { size: Some(UVec2::new(32, 24)), samples: Some(1), ..Wishes::default() };
+    let mut app = open(&source, &LoadOptions::default(), &wishes).unwrap().app;
+    app.world.init_resource::<Instrument>();
+    prepare(&mut app, &Arc::default());
+    let mut press = |taps: &[Tap]| {
+        app.world.resource_mut::<Input>().taps = taps.iter().map(|&tap| tap.into()).collect();
+        app.frame();
+        app.world.resource_mut::<Input>().end_frame();
+        let said = std::mem::take(&mut app.world.resource_mut::<Notices>().0);
+        said.into_iter().find(|notice| matches!(notice, Notice::Print(_)))
+    };
+    let home = press(&[Tap::PrintCamera]);
+    let there = press(&[Tap::FrameAll, Tap::Remember(1), Tap::PrintCamera]);
+    assert!(there.is_some() && there != home);
+    assert_eq!(press(&[Tap::PrintCamera]), there);
+    assert_eq!(press(&[Tap::ResetCamera, Tap::PrintCamera]), home);
+    press(&[Tap::Recall(1)]);
+    assert_eq!(press(&[Tap::PrintCamera]), there);
 }
