@@ -156,10 +156,14 @@ impl Viewer {
             self.ui.report = false;
         } else if self.ui.graph && !edits {
             self.ui.graph = false;
-        } else if edits || explains || self.compared.split {
+        } else {
+            // Also if nothing is known to be open: what a key before has opened, the engine alone may know.
             self.pass_on(Tap::Escape);
-        } else if let Some(quit) = self.options.keys.label(Tap::Quit, &self.letters) {
-            self.say(format!("{quit} quits"));
+            let is_open = edits || explains || self.compared.split;
+            let quit = self.options.keys.label(Tap::Quit, &self.letters).filter(|_| !is_open);
+            if let Some(quit) = quit {
+                self.say(format!("{quit} quits"));
+            }
         }
     }
 
