@@ -227,7 +227,11 @@ pub fn machine(status: &Status) -> Vec<Cell> {
     let [film, shown, hierarchy] = bytes.map(|bytes| significant(bytes as f64 / 1e6, 3));
     let [preview, carried] = first_picture.map(|seconds| significant(seconds * 1e3, 2));
     vec![
-        plain("scene", format!("{triangles} triangles, {instances} instances, {lights} lights")),
+        plain(
+            "scene",
+            [counted(triangles, "triangle"), counted(instances, "instance"), counted(lights, "light")]
+                .join(", "),
+        ),
         plain("memory", format!("film {film}, shown {shown}, hierarchy {hierarchy} MB")),
         plain("first picture", format!("preview {preview}, kept {carried} ms")),
         plain("development", format!("{} ms", significant(developing * 1e3, 2))),
@@ -247,6 +251,12 @@ pub fn significant(x: f64, digits: u32) -> String {
         let decimals = (f64::from(digits) - 1.0 - magnitude.log10().floor()).max(0.0) as usize;
         format!("{x:.decimals$}")
     }
+}
+
+/// So many of them, in plain English.
+#[must_use]
+pub fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 /// Of 1, with three digits; round levels as they are.
@@ -332,6 +342,15 @@ pub(super) mod tests {
             text(&headline(&status)),
             "noise 1.23 % ± 0.05; error 2 % true; samples 2.8 / 64; time left 12 s to 1 %"
         );
+    }
+
+    #[test]
+    fn one_is_not_told_as_several() {
+        let counts = [1, 1, 0];
+        let status = Status { machine: Machine { counts, ..Machine::default() }, ..status() };
+        assert_eq!(machine(&status)[0].value, "1 triangle, 1 instance, 0 lights");
+        let status = Status { machine: Machine { counts: [2, 34, 1], ..Machine::default() }, ..status };
+        assert_eq!(machine(&status)[0].value, "34 triangles, 2 instances, 1 light");
     }
 
     #[test]

@@ -133,6 +133,8 @@ impl Debug {
                     self.pin(press.cursor, viewpoint, size);
                     return Some("click a pixel to see its rays");
                 }
+                // In place of that, which stands for a while and is no longer so.
+                return Some("no rays any more");
             }
             Tap::Escape => (self.pinning, self.pinned, self.step, self.boxes) = (false, None, 0, Boxes::Off),
             Tap::Click if self.pinning => self.pin(press.cursor, viewpoint, size),
@@ -323,6 +325,14 @@ pub fn draw_layer(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_p_says_is_so() {
+        let mut debug = Debug::default();
+        let mut press = || debug.press(&Tap::Pin.into(), &Viewpoint::default(), UVec2::splat(9), 1);
+        assert_eq!(press(), Some("click a pixel to see its rays"));
+        assert_eq!(press(), Some("no rays any more"));
+    }
 
     #[test]
     fn a_pinned_pixel_is_the_same_place_after_a_resize() {

@@ -2,7 +2,7 @@
 
 use super::super::debug::boxes::{Boxes, Statistics};
 use super::super::debug::{DebugStatus, Told, color_of};
-use super::super::status::significant;
+use super::super::status::{counted, significant};
 use super::card;
 use super::style::{ACCENT, FAINT, MARGIN};
 use crate::bvh::inspect::{Order, Visited, Visits};
@@ -39,11 +39,15 @@ fn show_statistics(ui: &mut Ui, boxes: Boxes, statistics: &Statistics) {
     };
     ui.label(RichText::new(title).color(ACCENT));
     let [shown, wanted] = statistics.shown;
-    let boxes = if shown < wanted { format!("{shown} of {wanted} boxes") } else { format!("{shown} boxes") };
+    let boxes = match shown {
+        shown if shown < wanted => format!("{shown} of {wanted} boxes"),
+        1 => "1 box".to_owned(),
+        shown => format!("{shown} boxes"),
+    };
     let text = format!(
-        "{boxes}; {} instances, {} nodes, {} kB, cost {}",
-        statistics.instances,
-        statistics.nodes,
+        "{boxes}; {}, {}, {} kB, cost {}",
+        counted(statistics.instances, "instance"),
+        counted(statistics.nodes, "node"),
         statistics.bytes / 1000,
         significant(f64::from(statistics.cost), 3),
     );
