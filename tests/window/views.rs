@@ -2,6 +2,11 @@
 
 use super::desktop::{SMALL, colors, desktop, difference, green_and_red, pause, pictures_in, wait_for};
 
+/// Where no short notice lies.
+fn top(picture: &image::RgbImage) -> image::RgbImage {
+    image::imageops::crop_imm(picture, 0, 0, 320, 190).to_image()
+}
+
 #[test]
 fn views_of_pixels_and_cards_show_at_one_press_also_when_the_picture_rests() {
     let Some(desktop) = desktop("views") else {
@@ -22,16 +27,17 @@ fn views_of_pixels_and_cards_show_at_one_press_also_when_the_picture_rests() {
         desktop.xdotool(["key", "v"]);
         pause(900);
         // The notice stays for a while at the bottom.
-        let shown = image::imageops::crop_imm(&desktop.shot(&program), 0, 0, 320, 190).to_image();
-        let others = seen.iter().map(|s| image::imageops::crop_imm(s, 0, 0, 320, 190).to_image());
+        let shown = top(&desktop.shot(&program));
+        let others = seen.iter().map(top);
         // Samples are as many everywhere, and boxes on the walls.
         assert!(view == 3 || colors(&shown) > 1, "view {view} shows next to nothing");
         assert!(others.into_iter().all(|other| difference(&shown, &other) > 0.05), "view {view} is another");
         seen.push(desktop.shot(&program));
     }
     desktop.xdotool(["key", "v"]);
-    pause(7000);
-    assert_eq!(difference(&beauty, &desktop.shot(&program)), 0.0, "the picture is back");
+    wait_for("the picture", || {
+        (difference(&top(&beauty), &top(&desktop.shot(&program))) == 0.0).then_some(())
+    });
     for key in ["h", "g", "z"] {
         desktop.xdotool(["key", key]);
         pause(400);
@@ -69,11 +75,10 @@ fn a_pinned_pixel_shows_its_rays_and_boxes_show_the_hierarchy() {
     assert!(red > 30 && green < red, "{green} green, {red} red");
     // And all is gone again, but for the notice.
     desktop.xdotool(["key", "p"]);
-    pause(7000);
-    assert_eq!(difference(&plain, &desktop.shot(&program)), 0.0);
+    let differs = || difference(&top(&plain), &top(&desktop.shot(&program)));
+    wait_for("no rays", || (differs() == 0.0).then_some(()));
     desktop.xdotool(["key", "b"]);
-    pause(500);
-    assert!(difference(&plain, &desktop.shot(&program)) > 0.01, "a box around everything");
+    wait_for("a box around everything", || (differs() > 0.01).then_some(()));
 }
 
 #[test]
@@ -152,17 +157,26 @@ fn animations_play_stop_and_step_and_a_screenshot_knows_the_time() {
     });
     wait_for("it goes on", || (difference(&moved, &desktop.shot(&program)) > 0.01).then_some(()));
     desktop.xdotool(["key", "ctrl+space"]);
-    // The notice stays for a while at the bottom.
-    pause(7000);
-    let stopped = desktop.shot(&program);
-    pause(500);
-    assert_eq!(difference(&stopped, &desktop.shot(&program)), 0.0, "it stands still");
-    for _ in 0..6 {
-        desktop.xdotool(["key", "ctrl+period"]);
+    let still = || {
+        wait_for("it stands still", || {
+            let shot = top(&desktop.shot(&program));
+            pause(300);
+            (shot == top(&desktop.shot(&program))).then_some(shot)
+        })
+    };
+    let stopped = still();
+    for (key, moves) in [("ctrl+comma", true), ("ctrl+period", false), ("ctrl+period", true)] {
+        for _ in 0..6 {
+            desktop.xdotool(["key", key]);
+        }
+        // A quarter of a second before, the same as when it stopped, a quarter of a second later.
+        wait_for(&format!("the picture of another time after {key}"), || {
+            let shot = top(&desktop.shot(&program));
+            (if moves { difference(&stopped, &shot) > 0.01 } else { difference(&stopped, &shot) < 0.002 })
+                .then_some(())
+        });
     }
-    pause(7500);
-    let stepped = desktop.shot(&program);
-    assert!(difference(&stopped, &stepped) > 0.01, "a quarter of a second later");
+    still();
     desktop.xdotool(["key", "ctrl+F12"]);
     let shot = wait_for("a screenshot", || pictures_in(&desktop.directory).pop());
     pause(500);
