@@ -8,8 +8,14 @@
 #[path = "../support/desktop.rs"]
 mod desktop;
 mod editing;
+mod explaining;
 mod files;
 mod flying;
+mod looks;
+mod moving;
 mod pictures;
+mod places;
 mod resizing;
+mod things;
 mod views;
+mod watched;
