@@ -1,6 +1,6 @@
 //! Boxes, steps of a ray, parts of the picture, cards: what keys put over the picture, they also take away.
 
-use super::desktop::{difference, wait_for};
+use super::desktop::{difference, pause, wait_for};
 use super::watched::Watched;
 use image::RgbImage;
 use image::imageops::crop_imm;
@@ -159,7 +159,7 @@ fn warns(shown: &RgbImage) -> bool {
 #[test]
 fn keys_switch_old_samples_and_smoothing_off_and_on() {
     // Noisy for more than a moment.
-    let flags = |off| ["gallery", "--resolution", "640x480", "--spp", "100000", off];
+    let flags = ["gallery", "--resolution", "640x480", "--spp", "100000", "--no-smoothing"];
     let moving = |watched: &Watched, wanted: bool| {
         // To and fro, so that there is always something to see.
         let mut keys = ["a", "d"].into_iter().cycle();
@@ -171,14 +171,18 @@ fn keys_switch_old_samples_and_smoothing_off_and_on() {
             shown
         };
         if wanted {
-            wait_for("a word about old samples", || warns(&moved()).then_some(()));
+            wait_for("a word about old samples", || {
+                // There must be some first.
+                pause(300);
+                warns(&moved()).then_some(())
+            });
         } else {
             let shown: Vec<RgbImage> = (0..8).map(|_| moved()).collect();
             assert!(difference(&shown[0], &shown[7]) > 0.01, "it does not move");
             assert!(!shown.iter().any(warns), "old samples, or a word about them");
         }
     };
-    let Some(watched) = Watched::endless("old-samples", &flags("--no-smoothing")) else {
+    let Some(watched) = Watched::endless("old-samples", &flags) else {
         return;
     };
     moving(&watched, true);
@@ -193,12 +197,13 @@ fn keys_switch_old_samples_and_smoothing_off_and_on() {
         watched.keys(&["r"]);
         (0..6).any(|_| warns(&watched.upper()))
     };
-    let Some(watched) = Watched::endless("smoothing", &flags("--no-kept-samples")) else {
+    // Old samples are none where nothing moves.
+    let Some(watched) = Watched::endless("smoothing", &flags[..5]) else {
         return;
     };
     wait_for("a word about smoothing", || beginning(&watched).then_some(()));
     watched.keys(&["u"]);
-    wait_for("nothing smoothed", || (!beginning(&watched)).then_some(()));
+    wait_for("nothing smoothed", || (0..3).all(|_| !beginning(&watched)).then_some(()));
     watched.keys(&["u"]);
     wait_for("a word about smoothing again", || beginning(&watched).then_some(()));
 }

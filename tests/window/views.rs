@@ -165,11 +165,11 @@ fn animations_play_stop_and_step_and_a_screenshot_knows_the_time() {
         })
     };
     let stopped = still();
-    for (key, moves) in [("ctrl+comma", true), ("ctrl+period", false), ("ctrl+period", true)] {
+    for (key, moves) in [("ctrl+period", true), ("ctrl+comma", false), ("ctrl+period", true)] {
         for _ in 0..6 {
             desktop.xdotool(["key", key]);
         }
-        // A quarter of a second before, the same as when it stopped, a quarter of a second later.
+        // A quarter of a second later, as when it stopped, and later again.
         wait_for(&format!("the picture of another time after {key}"), || {
             let shot = top(&desktop.shot(&program));
             (if moves { difference(&stopped, &shot) > 0.01 } else { difference(&stopped, &shot) < 0.002 })
