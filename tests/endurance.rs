@@ -16,10 +16,10 @@ const ANSWER: Duration = Duration::from_secs(10);
 /// What memory may grow by from the first tenth of the time to the end, MiB: more than what buffers of the largest size
 /// that was tried and a second scene while one is loaded take, and less than one leaked picture for each action.
 const GROWTH: f64 = 48.0;
-/// What memory may ever be above that of the first picture, MiB. Letters, cards and screenshots stay once they are there:
-/// 60. The film of the largest window, 560 × 440 of 112 bytes a pixel, takes 26, and what is shown and kept beside it no
-/// more than twice that; all of it is there twice while another size or scene takes its place: 160. The most in an hour
-/// was 370 MiB, 160 above.
+/// What memory may ever be above that of the first picture, MiB. Letters, cards and screenshots stay once they are
+/// there: 60. The film of the largest window, 560 × 440 of 112 bytes a pixel, takes 26, and what is shown and kept
+/// beside it no more than twice that; all of it is there twice while another size or scene takes its place: 160. The
+/// most in an hour was 370 MiB, 160 above.
 const PEAK: f64 = 60.0 + 160.0;
 
 const SCENE: &str = "[[model]]\nfile = 'room.obj'\n[[light]]\nkind = 'parallelogram'\n\
