@@ -388,8 +388,8 @@ impl Files {
     }
 }
 
-/// Takes what the next frame does. Its systems have an order of their own: what a key does shall come after all that the
-/// user did before, so a key waits for a frame of its own, with its repetitions.
+/// Takes what the next frame does. Its systems have an order of their own: what a key does shall come after all that
+/// the user did before, so a key waits for a frame of its own, with its repetitions.
 fn of_one_frame(waiting: &mut VecDeque<Command>) -> Vec<Command> {
     let first = match waiting.front() {
         Some(Command::Tap { press, .. }) => Some(press.tap),

@@ -4,8 +4,8 @@ use super::desktop::{difference, wait_for};
 use super::watched::{ROOM, Watched, upper};
 use image::RgbImage;
 
-/// Closes the card, and saves the edits: what the window shows is what the printed command renders. Returns that, and the
-/// settings file.
+/// Closes the card, and saves the edits: what the window shows is what the printed command renders. Returns that, and
+/// the settings file.
 fn saved(watched: &Watched, what: &str) -> (RgbImage, String) {
     watched.keys(&["Escape"]);
     let said = watched.answer("ctrl+e");
