@@ -72,6 +72,25 @@ fn a_smoothed_picture_is_nearer_to_the_truth_and_the_film_does_not_know() {
 }
 
 #[test]
+fn who_wants_no_old_samples_has_the_first_second_smoothed_all_the_same() {
+    let mut app = watched("cornell", Integrator::Path, 2, false);
+    app.world.resource_mut::<Shown>().only_film = true;
+    app.world.resource_mut::<RenderSettings>().seed = 1;
+    app.world.resource_mut::<FrameBudget>().time = None;
+    while app.world.resource::<Film>().complete_samples() != 2 {
+        app.frame();
+    }
+    app.world.resource_mut::<FrameBudget>().time = Some(Duration::ZERO);
+    for _ in 0..20 {
+        app.frame();
+    }
+    app.world.resource_mut::<Shown>().set_changed();
+    app.frame();
+    assert!(app.world.resource::<Shown>().is_smoothed());
+    assert_eq!(app.world.resource::<Shown>().kept_share(0, false), 0.0);
+}
+
+#[test]
 fn a_finished_picture_is_not_smoothed_nor_one_that_is_compared() {
     let mut app = watched("cornell", Integrator::Path, 2, false);
     assert!(app.world.resource::<Shown>().is_smoothed());

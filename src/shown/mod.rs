@@ -269,10 +269,15 @@ pub fn keep(
 ) {
     // Asked in each frame, so that no change is overlooked.
     let is_other = inputs.scene_is_changed();
-    if !(budget.preview && budget.develop) || shown.only_film {
+    // Smoothing asks what is behind the pixels too.
+    let nobody_asks = shown.only_film && shown.never_smooth;
+    if !(budget.preview && budget.develop) || nobody_asks {
         shown.forget();
         preview.reserve(Duration::ZERO);
         return;
+    }
+    if shown.only_film {
+        shown.share = 0.0;
     }
     let scene = inputs.scene();
     if stats.begun {
@@ -280,6 +285,7 @@ pub fn keep(
         // What a lens shows of a point, it shows from there only.
         let can_carry =
             !is_other && shown.is_whole && !scene.viewpoint.has_lens() && shown.size == film.size();
+        let can_carry = can_carry && !shown.only_film;
         if can_carry && shown.viewpoint.is_some_and(|old| !old.has_lens()) {
             let start = Instant::now();
             let seconds = CARRYING * preview.target();
@@ -288,6 +294,7 @@ pub fn keep(
             shown.seconds[0] = start.elapsed().as_secs_f64();
         } else {
             shown.forget();
+            preview.reserve(Duration::ZERO);
         }
     } else if film.complete_samples() > 0 {
         let start = Instant::now();
