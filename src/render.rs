@@ -3,9 +3,12 @@
 use crate::app::{FrameBudget, FrameStats};
 use crate::farm::{self, FilmError, FilmFile, Header, Identity, is_film};
 use crate::image::compare::{CompareError, LinearImage};
+use crate::image::files::save_image;
 use crate::image::{Display, ErrorLog, ImageError, save};
 use crate::load::{Kind, LoadOptions, Phase, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
+use crate::sync::traceable;
+use crate::trace::guess::guessed;
 use crate::trace::{Film, Geometry, RayCounts, RenderSettings};
 use crate::watch::{Seen, Watch};
 use glam::UVec2;
@@ -260,7 +263,12 @@ pub fn render(
         .then(|| first_sample..first_sample + target.max(film.complete_samples()));
     let display = *app.world.resource::<Display>();
     let header = identity.map(|identity| Header::new(identity, planned, &display));
-    save_all(&job.outputs, film, &display, header.as_ref())?;
+    let is_picture = |path: &PathBuf| !is_film(path);
+    let guess = (film.has_gaps() && job.outputs.iter().any(is_picture)).then(|| {
+        let pixels = guessed(film, &traceable(&app.world));
+        LinearImage { size: film.size(), pixels }
+    });
+    save_all(&job.outputs, (film, guess.as_ref()), &display, header.as_ref())?;
     if let Some(trouble) = watch.trouble {
         return Err(trouble.into());
     }
@@ -352,13 +360,13 @@ fn reference_picture(path: &Path, size: UVec2) -> Result<LinearImage, RenderErro
     Err(CompareError::Size { a: "the render".to_owned(), size_a: size, b, size_b }.into())
 }
 
-/// Writes all files, each by its ending. One that cannot be written does not keep the others from it.
+/// Writes all files, each by its ending; pictures are of the guess if there is one. One that cannot be written does not keep the others from it.
 ///
 /// # Errors
 /// The first failure.
 pub fn save_all(
     paths: &[PathBuf],
-    film: &Film,
+    (film, guess): (&Film, Option<&LinearImage>),
     display: &Display,
     header: Option<&Header>,
 ) -> Result<(), ImageError> {
@@ -366,7 +374,7 @@ pub fn save_all(
         Some(header) if is_film(path) => {
             farm::format::write(path, header, film, &farm::format::held_by(film))
         }
-        _ => save(path, film, display),
+        _ => guess.map_or_else(|| save(path, film, display), |guess| save_image(path, guess, display)),
     };
     let done: Vec<Result<(), ImageError>> = paths.iter().map(save).collect();
     done.into_iter().collect()

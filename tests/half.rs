@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3, UVec2, Vec3};
 use penumbra::image::files::linear_pixels;
 use penumbra::scene::{Light, Material};
 use penumbra::trace::film::Tile;
+use penumbra::trace::guess::{guessed, guessed_blindly};
 use penumbra::trace::{Film, Integrator, RenderSettings, trace_half, trace_pass};
 use stage::{Stage, quad, settings};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -89,4 +90,39 @@ fn a_picture_that_was_hardly_begun_has_no_holes() {
     film.confine(Some([UVec2::ZERO, UVec2::splat(8)]));
     assert!(linear_pixels(&film).contains(&Vec3::ZERO));
     assert!(linear_pixels(&Film::new(UVec2::splat(9), 0)).iter().all(|pixel| *pixel == Vec3::ZERO));
+}
+
+/// Dark and bright steps of a stair, each a few pixels high, of which every other tile is known.
+#[test]
+fn what_is_guessed_goes_along_surfaces() {
+    let mut stage = Stage::new(RenderSettings { seed: 3, ..settings(64, 64, Integrator::Direct, 1) });
+    for i in 0..12 {
+        let (y, z) = (f64::from(i) * 0.1 - 0.6, f64::from(i % 2) * -0.05);
+        let grey = Material::lambert(Vec3::splat(if i % 2 == 0 { 0.8 } else { 0.1 }));
+        let step = quad(Vec3::new(-1.0, 0.0, 0.0), Vec3::X * 2.0, Vec3::Y * 0.1);
+        stage.add_mesh(step, grey, DAffine3::from_translation(DVec3::new(0.0, y, z)));
+    }
+    let light = Light::Point { intensity: Vec3::splat(9.0) };
+    stage.add(light, DAffine3::from_translation(DVec3::new(0.5, 0.2, 3.0)));
+    stage.look(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
+    stage.app.build();
+    let scene = stage.scene();
+    let mut film = Film::new(scene.settings.size, 0);
+    trace_pass(&scene, &mut film, 64, 64, || true);
+    let truth = linear_pixels(&film);
+    let empty = Film::new(film.size(), 0);
+    for (i, tile) in film.tiles_mut().iter_mut().enumerate().filter(|(i, _)| (i % 8 + i / 8) % 2 == 0) {
+        *tile = empty.tiles()[i].clone();
+    }
+    assert!(film.has_gaps());
+    let error = |guess: Vec<Vec3>| {
+        let squares = guess.iter().zip(&truth).map(|(guess, truth)| (*guess - *truth).length_squared());
+        squares.sum::<f32>() / truth.len() as f32
+    };
+    let (with, without) = (error(guessed(&film, &scene)), error(guessed_blindly(&film)));
+    println!("squared error {with:.2e}, {without:.2e} without surfaces");
+    assert!(with < 0.1 * without, "{with} is not far below {without}");
+    // What is known is as it is, to the bit.
+    let known = guessed(&film, &scene);
+    assert_eq!(known[8], truth[8]);
 }

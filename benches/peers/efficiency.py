@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Error after equal CPU time, Penumbra beside Mitsuba 3: a Markdown table.
+"""Error after equal CPU time, Penumbra beside Mitsuba 3 and, with `--cycles BPY`, Blender's Cycles: a Markdown table.
 
     benches/peers/efficiency.py HARNESS [--scenes cornell,softshadows] [--modes direct,path5] [--binary target/release/penumbra]
 
-HARNESS is the folder with `renderers/` (its README says what Mitsuba needs). One thread each, in turn, in one run.
+HARNESS is the folder with `renderers/` (its README says what Mitsuba needs), BPY that of the module `bpy`. One thread each, in turn, in one run.
 RMSE against the harness's references, pixels that see a light left out, the reference's own variance subtracted.
 """
 import argparse, json, os, subprocess, sys, tempfile
@@ -16,6 +16,7 @@ parser.add_argument("--scenes", default="cornell,softshadows")
 parser.add_argument("--modes", default="direct,path5")
 parser.add_argument("--samplers", default="multijitter,ldsampler")
 parser.add_argument("--seconds", default="0.5,2,8")
+parser.add_argument("--cycles")
 parser.add_argument("--binary", default="target/release/penumbra")
 args = parser.parse_args()
 renderers = os.path.join(os.path.abspath(args.harness), "renderers")
@@ -83,18 +84,37 @@ def mitsuba(name, mode, folder):
     return [min(at(curve, t) for curve in curves.values()) for t in TIMES]
 
 
+def cycles(name, mode, folder):
+    """RMSE at TIMES. Its times hold loading and building: what each sample takes is the slope between the least and the most."""
+    log = os.path.join(folder, "cycles.jsonl")
+    command = [sys.executable, "run_cycles.py", "bench", "--threads", "1", "--scenes", name, "--modes", mode, "--seeds", "2"]
+    command += ["--patterns", "TABULATED_SOBOL", "--spps", "1,4,16,64", "--json", log]
+    subprocess.run(command, cwd=renderers, check=True, stdout=subprocess.DEVNULL, env=dict(os.environ, BPY_SITE=args.cycles))
+    lines = [line for line in map(json.loads, open(log)) if (line["scene"], line["mode"]) == (name, mode)]
+    errors, seconds = {}, {}
+    for line in lines:
+        errors.setdefault(line["spp"], []).append(line["rmse"])
+        seconds.setdefault(line["spp"], []).append(line["cpu"])
+    least, most = min(errors), max(errors)
+    each = (min(seconds[most]) - min(seconds[least])) / (most - least)
+    curve = sorted((each * spp, float(np.sqrt(np.mean(np.square(found))))) for spp, found in errors.items())
+    return [float(np.exp(np.interp(np.log(t), *np.log(np.array(curve)).T))) for t in TIMES]
+
+
+peers = {"Mitsuba": mitsuba} | ({"Cycles": cycles} if args.cycles else {})
 with tempfile.TemporaryDirectory() as folder:
-    print("| RMSE after | " + " | ".join(f"Penumbra {t:g} s | Mitsuba | ratio" for t in TIMES) + " |")
-    print("|---|" + "---|" * (3 * len(TIMES)))
+    heads = [f"{peer} | ratio" for peer in peers]
+    print("| RMSE after | " + " | ".join(" | ".join([f"Penumbra {t:g} s", *heads]) for t in TIMES) + " |")
+    print("|---|" + "---|" * ((1 + 2 * len(peers)) * len(TIMES)))
     for name in args.scenes.split(","):
         path = settings_file(name, folder)
         for mode in args.modes.split(","):
             reference, mask = common.ref(name, mode), common.mask(name)
             stored = np.load(common.ref_path(name, mode))
             variance = float(stored["rmse_est"]) ** 2 if "rmse_est" in stored else 0.0
-            peer = mitsuba(name, mode, folder)
+            found = [peer(name, mode, folder) for peer in peers.values()]
             cells = []
-            for t, theirs in zip(TIMES, peer):
+            for t, theirs in zip(TIMES, zip(*found)):
                 mine = ours(path, mode, t, reference, mask, variance, folder)
-                cells.append(f"{mine:.2g} | {theirs:.2g} | {(theirs / mine) ** 2:.2g}")
+                cells.append(" | ".join([f"{mine:.2g}"] + [f"{their:.2g} | {(their / mine) ** 2:.2g}" for their in theirs]))
             print(f"| {name}, {mode} | " + " | ".join(cells) + " |", flush=True)

@@ -4,6 +4,7 @@ use super::compare::LinearImage;
 use super::develop::Display;
 use super::develop::{develop, develop_image};
 use crate::trace::Film;
+use crate::trace::guess::{guessed_blindly, means};
 use glam::{UVec2, Vec3};
 use image::{ImageFormat, Rgb32FImage, RgbaImage};
 use std::io::Cursor;
@@ -66,77 +67,49 @@ impl PictureFormat {
 /// # Errors
 /// If the ending is unknown or the file cannot be written.
 pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageError> {
-    let format = PictureFormat::of(path)?;
-    let size = film.size();
+    if film.has_gaps() {
+        return save_image(path, &LinearImage::of(film), display);
+    }
+    let pixels = match PictureFormat::of(path)? {
+        PictureFormat::Png => return write_png(path, film.size(), develop(film, None, display)),
+        PictureFormat::Exr => linear_pixels(film),
+    };
+    write_exr(path, film.size(), pixels)
+}
+
+/// The same of a picture.
+///
+/// # Errors
+/// If the ending is unknown or the file cannot be written.
+pub fn save_image(path: &Path, image: &LinearImage, display: &Display) -> Result<(), ImageError> {
+    match PictureFormat::of(path)? {
+        PictureFormat::Png => write_png(path, image.size, develop_image(image, display)),
+        PictureFormat::Exr => write_exr(path, image.size, image.pixels.clone()),
+    }
+}
+
+fn write_png(path: &Path, size: UVec2, rgba: Vec<u8>) -> Result<(), ImageError> {
+    let image = RgbaImage::from_raw(size.x, size.y, rgba).unwrap_or_default();
+    encode(path, &image::DynamicImage::from(image).into_rgb8().into(), ImageFormat::Png)
+}
+
+fn write_exr(path: &Path, size: UVec2, pixels: Vec<Vec3>) -> Result<(), ImageError> {
+    let linear = pixels.into_iter().flat_map(|p| p.to_array()).collect();
+    let image = Rgb32FImage::from_raw(size.x, size.y, linear).unwrap_or_default();
+    encode(path, &image.into(), ImageFormat::OpenExr)
+}
+
+fn encode(path: &Path, image: &image::DynamicImage, format: ImageFormat) -> Result<(), ImageError> {
     let mut bytes = Cursor::new(Vec::new());
     let codec = |source| ImageError::Codec { path: path.to_path_buf(), source };
-    match format {
-        PictureFormat::Png => {
-            let developed = if is_guessed(film) {
-                develop_image(&LinearImage::of(film), display)
-            } else {
-                develop(film, None, display)
-            };
-            let image = RgbaImage::from_raw(size.x, size.y, developed).unwrap_or_default();
-            let image = image::DynamicImage::from(image).into_rgb8();
-            image.write_to(&mut bytes, ImageFormat::Png).map_err(codec)?;
-        }
-        PictureFormat::Exr => {
-            let linear = linear_pixels(film).into_iter().flat_map(|p| p.to_array()).collect();
-            let image = Rgb32FImage::from_raw(size.x, size.y, linear).unwrap_or_default();
-            image.write_to(&mut bytes, ImageFormat::OpenExr).map_err(codec)?;
-        }
-    }
+    image.write_to(&mut bytes, format).map_err(codec)?;
     write_whole(path, bytes.get_ref())
 }
 
 /// Mean radiances, rows from the top. Where there was not even time for a sample of each pixel, the others are guessed.
 #[must_use]
 pub fn linear_pixels(film: &Film) -> Vec<Vec3> {
-    let pixels = || (0..film.size().y).flat_map(|y| film.row(y));
-    let mut means: Vec<Vec3> = pixels().map(|pixel| pixel.mean().as_vec3()).collect();
-    if is_guessed(film) {
-        let known = pixels().map(|pixel| pixel.count() > 0).collect();
-        fill(&mut means, known, film.size());
-    }
-    means
-}
-
-/// Whether it has pixels that nobody has looked at yet. (Those of which all samples were dropped stay black.)
-fn is_guessed(film: &Film) -> bool {
-    film.complete_samples() == 0 && film.region().is_none()
-}
-
-/// Gives each pixel that is not `known` the mean of those beside it that are, one ring after the other.
-fn fill(pixels: &mut [Vec3], mut known: Vec<bool>, size: UVec2) {
-    let beside = |at: usize| {
-        let (at, across) = (at as u32, size.x);
-        let (x, y) = (at % across, at / across);
-        let there = [
-            (x > 0).then(|| at - 1),
-            (x + 1 < across).then(|| at + 1),
-            (y > 0).then(|| at - across),
-            (y + 1 < size.y).then(|| at + across),
-        ];
-        there.into_iter().flatten().map(|at| at as usize)
-    };
-    let mut waits: Vec<bool> = known.iter().map(|known| !known).collect();
-    let mut ring: Vec<usize> =
-        (0..pixels.len()).filter(|&at| waits[at] && beside(at).any(|there| known[there])).collect();
-    while !ring.is_empty() {
-        ring.iter().for_each(|&at| waits[at] = false);
-        for &at in &ring {
-            let around = beside(at).filter(|&there| known[there]);
-            let (sum, count) =
-                around.fold((Vec3::ZERO, 0.0), |(sum, count), there| (sum + pixels[there], count + 1.0));
-            pixels[at] = sum / count;
-        }
-        ring.iter().for_each(|&at| known[at] = true);
-        let mut next: Vec<usize> = ring.iter().flat_map(|&at| beside(at)).filter(|&at| waits[at]).collect();
-        next.sort_unstable();
-        next.dedup();
-        ring = next;
-    }
+    if film.has_gaps() { guessed_blindly(film) } else { means(film) }
 }
 
 /// Writes beside `path` and renames, so that nobody ever sees half a file.

@@ -73,7 +73,7 @@ pub fn smooth(
     let mut light: Vec<Vec4> = cells
         .par_iter()
         .zip(places)
-        .map(|(cell, place)| (cell.truncate() / base(place)).extend(0.0))
+        .map(|(cell, place)| (cell.truncate() / place.base()).extend(0.0))
         .collect();
     let variances = variances(film, cells, places, &guides, &light, &keep_going)?;
     light.iter_mut().zip(variances).for_each(|(light, variance)| light.w = variance);
@@ -99,18 +99,9 @@ pub fn smooth(
     }
     let mut smoothed = light;
     smoothed.par_iter_mut().zip(cells).zip(places).for_each(|((out, cell), place)| {
-        *out = (out.truncate() * base(place)).extend(cell.w);
+        *out = (out.truncate() * place.base()).extend(cell.w);
     });
     Some(smoothed)
-}
-
-/// What light is divided by.
-fn base(place: &Place) -> Vec3 {
-    if place.is_instance() {
-        (Vec3::from_array(place.albedo.map(f32::from)) / 255.0).max(Vec3::splat(0.02))
-    } else {
-        Vec3::ONE
-    }
 }
 
 /// A pixel's mean with its two neighbours at `step` along a row (`stride` 1) or a column.
@@ -163,7 +154,7 @@ fn variances(
                 let index = y * width + x;
                 // Old samples have no noise that we would know of.
                 let share = pixel.count() as f32 / cells[index].w.max(1.0);
-                let half = luminance((a - b).as_vec3() / base(&places[index])) * 0.5 * share;
+                let half = luminance((a - b).as_vec3() / places[index].base()) * 0.5 * share;
                 *own = half * half;
             }
         });

@@ -14,6 +14,7 @@ mod diffuse;
 pub mod explain;
 pub mod film;
 pub mod first;
+pub mod guess;
 pub mod integrator;
 pub mod light;
 pub mod light_tree;

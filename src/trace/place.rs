@@ -89,6 +89,16 @@ impl Place {
                     && self.facet.dot(other.position - self.position).abs() <= pixel)
     }
 
+    /// What light is divided by to leave base colours out of it.
+    #[must_use]
+    pub fn base(&self) -> Vec3 {
+        if self.is_instance() {
+            (Vec3::from_array(self.albedo.map(f32::from)) / 255.0).max(Vec3::splat(0.02))
+        } else {
+            Vec3::ONE
+        }
+    }
+
     fn plain(position: Vec3, facet: Vec3, thing: u32, keeps: u8) -> Self {
         Self { position, facet, thing, normal: packed(facet), keeps, albedo: [255; 3], edge: false }
     }

@@ -203,6 +203,12 @@ impl Film {
         self.working().map(seen).sum::<usize>() as f64 / pixels as f64
     }
 
+    /// Whether it has pixels that nobody has looked at yet.
+    #[must_use]
+    pub fn has_gaps(&self) -> bool {
+        self.complete_samples() == 0 && self.region().is_none()
+    }
+
     /// Samples dropped because they were not finite.
     #[must_use]
     pub fn dropped(&self) -> u64 {
