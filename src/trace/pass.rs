@@ -134,16 +134,17 @@ pub fn trace_half(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() -> 
         }
         rays
     };
-    let tiles = far_apart(film).into_par_iter().filter(|tile| tile.next_sample == first);
+    // There may not be time for all of them: holes are of one tile.
+    let tiles = far_apart(film, 0).into_par_iter().filter(|tile| tile.next_sample == first);
     tiles.map_init(Batch::default, look).reduce(RayCounts::default, |a, b| a + b)
 }
 
 /// Tiles side by side that are worked on one after the other, as a power of two: what is near is at hand.
-const TOGETHER: u32 = 2;
+const AT_HAND: u32 = 2;
 
-/// The tiles that are worked on. Before all have a sample, groups that come one after the other are far apart (by the bits of
-/// their place, reversed): what there is time for is of the whole picture.
-fn far_apart(film: &mut Film) -> Vec<&mut Tile> {
+/// The tiles that are worked on. Before all have a sample, groups of so many that come one after the other are far apart (by the
+/// bits of their place, reversed): what there is time for is of the whole picture, and after half the rest is a chess board.
+fn far_apart(film: &mut Film, together: u32) -> Vec<&mut Tile> {
     let (is_first, is_for_all) = (film.complete_samples() == 0, film.has_first_shares());
     let mut tiles: Vec<&mut Tile> =
         film.tiles_mut().iter_mut().filter(|tile| is_for_all || !tile.rests()).collect();
@@ -151,8 +152,8 @@ fn far_apart(film: &mut Film) -> Vec<&mut Tile> {
         let spread =
             |number: u32| (0..u32::BITS).map(|bit| u64::from(number >> bit & 1) << (2 * bit)).sum::<u64>();
         tiles.sort_by_cached_key(|tile| {
-            let [x, y] = ((tile.origin / TILE) >> TOGETHER).to_array().map(spread);
-            (x | y << 1).reverse_bits()
+            let [x, y] = ((tile.origin / TILE) >> together).to_array();
+            (spread(x ^ y) | spread(y) << 1).reverse_bits()
         });
     }
     tiles
@@ -198,5 +199,8 @@ fn trace_tiles(
         tile.complete = samples;
         rays
     };
-    far_apart(film).into_par_iter().map_init(Batch::default, trace).reduce(RayCounts::default, |a, b| a + b)
+    far_apart(film, AT_HAND)
+        .into_par_iter()
+        .map_init(Batch::default, trace)
+        .reduce(RayCounts::default, |a, b| a + b)
 }
