@@ -257,17 +257,16 @@ pub fn render(
 
     let film = app.world.resource::<Film>();
     let noise = crate::trace::noise::relative_noise(film);
-    watch.log(film, render_seconds, noise);
+    let guess = film.has_gaps().then(|| {
+        let pixels = guessed(film, &traceable(&app.world));
+        LinearImage { size: film.size(), pixels }
+    });
+    watch.log(film, guess.as_ref(), render_seconds, noise);
     // Where somebody may want to go on, the film says how far it was to go.
     let planned = (job.noise.is_none() && target < u32::MAX - first_sample)
         .then(|| first_sample..first_sample + target.max(film.complete_samples()));
     let display = *app.world.resource::<Display>();
     let header = identity.map(|identity| Header::new(identity, planned, &display));
-    let is_picture = |path: &PathBuf| !is_film(path);
-    let guess = (film.has_gaps() && job.outputs.iter().any(is_picture)).then(|| {
-        let pixels = guessed(film, &traceable(&app.world));
-        LinearImage { size: film.size(), pixels }
-    });
     save_all(&job.outputs, (film, guess.as_ref()), &display, header.as_ref())?;
     if let Some(trouble) = watch.trouble {
         return Err(trouble.into());
@@ -360,7 +359,8 @@ fn reference_picture(path: &Path, size: UVec2) -> Result<LinearImage, RenderErro
     Err(CompareError::Size { a: "the render".to_owned(), size_a: size, b, size_b }.into())
 }
 
-/// Writes all files, each by its ending; pictures are of the guess if there is one. One that cannot be written does not keep the others from it.
+/// Writes all files, each by its ending; pictures are of the guess if there is one. One that cannot be written does not keep the
+/// others from it.
 ///
 /// # Errors
 /// The first failure.

@@ -1,5 +1,6 @@
 //! What a headless render looks at between passes: whether the noise is down to its goal, and the true error.
 
+use crate::image::compare::LinearImage;
 use crate::image::{ErrorLog, ImageError};
 use crate::trace::Film;
 use crate::trace::convergence::{Convergence, DARK_ENOUGH, FEWEST_TO_STOP, first_look, next_look};
@@ -52,7 +53,7 @@ impl Watch {
         if let Some(noise) = noise {
             self.convergence.note(f64::from(samples), noise);
         }
-        self.log(film, seconds, noise);
+        self.log(film, None, seconds, noise);
         self.next = next_look(samples);
         self.spent += began.elapsed();
         match (self.goal, noise) {
@@ -62,12 +63,12 @@ impl Watch {
         }
     }
 
-    /// Adds a row to the log, if there is one that doesn't have it yet.
-    pub fn log(&mut self, film: &Film, seconds: f64, noise: Option<f64>) {
+    /// Adds a row to the log, if there is one that doesn't have it yet: of the film, or of what was guessed of it.
+    pub fn log(&mut self, film: &Film, guess: Option<&LinearImage>, seconds: f64, noise: Option<f64>) {
         let samples = film.mean_samples();
         let Some(log) = &mut self.log else { return };
         if self.logged.replace(samples) != Some(samples)
-            && let Err(error) = log.note(film, seconds, noise)
+            && let Err(error) = log.note(guess.unwrap_or(&LinearImage::of(film)), samples, seconds, noise)
         {
             self.log = None;
             self.trouble = Some(error);

@@ -2,7 +2,6 @@
 
 use super::compare::{Difference, LinearImage};
 use super::files::ImageError;
-use crate::trace::Film;
 use crate::trace::noise::relative_error;
 use std::fs::File;
 use std::io::Write;
@@ -34,18 +33,22 @@ impl ErrorLog {
         Ok(Self { path: path.to_path_buf(), file, reference, truth })
     }
 
-    /// Adds a row: error of `film` after `seconds`, and the noise that was estimated then.
+    /// Adds a row: error of a picture of so many samples per pixel after `seconds`, and the noise that was estimated then.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn note(&mut self, film: &Film, seconds: f64, noise: Option<f64>) -> Result<(), ImageError> {
-        let picture = LinearImage::of(film);
-        let Difference { rmse, relative_mse, .. } = Difference::between(&picture, &self.reference);
+    pub fn note(
+        &mut self,
+        picture: &LinearImage,
+        samples: f64,
+        seconds: f64,
+        noise: Option<f64>,
+    ) -> Result<(), ImageError> {
+        let Difference { rmse, relative_mse, .. } = Difference::between(picture, &self.reference);
         // What the noise number estimates, measured.
-        let relative = relative_error(&picture.luminances(), &self.truth, film.size());
+        let relative = relative_error(&picture.luminances(), &self.truth, picture.size);
         let cell = |number: Option<f64>| number.map_or_else(String::new, |number| format!("{number:e}"));
         let (relative, noise) = (cell(relative), cell(noise));
-        let samples = film.mean_samples();
         writeln!(self.file, "{seconds:.6},{samples},{rmse:e},{relative_mse:e},{relative},{noise}")
             .and_then(|()| self.file.flush())
             .map_err(|source| ImageError::Io { path: self.path.clone(), source })

@@ -175,7 +175,7 @@ impl Shown {
             }
             self.exact_rows = last;
         }
-        if self.is_looked_at() {
+        if self.is_looked_at() && !self.only_film {
             // So that the first step does not wait for memory.
             self.kept.resize(count, Vec4::ZERO);
             self.spare.resize(count, Spot::UNKNOWN);

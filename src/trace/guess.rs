@@ -12,9 +12,10 @@ use rayon::prelude::*;
 
 /// Planes go on if they are no farther off than so many pixels.
 const NEAR: f32 = 2.0;
+/// Base colours below that are taken for it: at the border of a dark texel there are samples of a bright one.
+const DARK: f32 = 0.1;
 
-/// Mean radiances, rows from the top; those of pixels without samples guessed by what they show of `scene`. (Those of which all
-/// samples were dropped stay black.)
+/// Mean radiances, rows from the top; those of pixels without samples guessed by what they show of `scene`.
 #[must_use]
 pub fn guessed(film: &Film, scene: &TraceScene) -> Vec<Vec3> {
     let size = film.size();
@@ -25,21 +26,20 @@ pub fn guessed(film: &Film, scene: &TraceScene) -> Vec<Vec3> {
         places(scene, &middles, row);
     });
     let sheet = scene.viewpoint.sheet(size);
-    let means = means(film);
-    let mut light: Vec<Vec3> = means.iter().zip(&shown).map(|(mean, place)| mean / place.base()).collect();
-    let looked_at = looked_at(film);
-    let mut known = looked_at.clone();
-    fill(&mut light, &mut known, size, |at, there| is_one(&shown[at], &shown[there], &sheet));
-    fill(&mut light, &mut known, size, |_, _| true);
-    let all = means.iter().zip(&light).zip(shown.iter().zip(looked_at));
-    all.map(|((mean, light), (place, known))| if known { *mean } else { light * place.base() }).collect()
+    let bases: Vec<Vec3> = shown.iter().map(|place| place.base().max(Vec3::splat(DARK))).collect();
+    let (mut means, mut known) = (means(film), looked_at(film));
+    let is_one = |at: usize, there: usize| is_one(&shown[at], &shown[there], &sheet);
+    fill(&mut means, &bases, &mut known, size, is_one);
+    fill(&mut means, &bases, &mut known, size, |_, _| true);
+    means
 }
 
 /// The same where nobody knows what they show.
 #[must_use]
 pub fn guessed_blindly(film: &Film) -> Vec<Vec3> {
     let (mut means, mut known) = (means(film), looked_at(film));
-    fill(&mut means, &mut known, film.size(), |_, _| true);
+    let bases = vec![Vec3::ONE; means.len()];
+    fill(&mut means, &bases, &mut known, film.size(), |_, _| true);
     means
 }
 
@@ -60,9 +60,15 @@ fn is_one(here: &Place, there: &Place, sheet: &Sheet) -> bool {
     here.continues(there, NEAR * sheet.pixel(sheet.own(here.position).z.max(0.0)))
 }
 
-/// Gives each pixel that is not `known` the mean of those beside it that are and are alike, one ring after the other. Then it is
-/// known too.
-fn fill(pixels: &mut [Vec3], known: &mut [bool], size: UVec2, alike: impl Fn(usize, usize) -> bool) {
+/// Gives each pixel that is not `known` the light of those beside it that are and are alike, on its own base colour, one ring
+/// after the other. Then it is known too.
+fn fill(
+    pixels: &mut [Vec3],
+    bases: &[Vec3],
+    known: &mut [bool],
+    size: UVec2,
+    alike: impl Fn(usize, usize) -> bool,
+) {
     let alike = &alike;
     let beside = |at: usize| {
         let (at, across) = (at as u32, size.x);
@@ -82,9 +88,11 @@ fn fill(pixels: &mut [Vec3], known: &mut [bool], size: UVec2, alike: impl Fn(usi
         ring.iter().for_each(|&at| waits[at] = false);
         for &at in &ring {
             let around = beside(at).filter(|&there| known[there] && alike(at, there));
-            let (sum, count) =
-                around.fold((Vec3::ZERO, 0.0), |(sum, count), there| (sum + pixels[there], count + 1.0));
-            pixels[at] = sum / count;
+            // Together: the dark ones say little of the light.
+            let (sum, base) = around.fold((Vec3::ZERO, Vec3::ZERO), |(sum, base), there| {
+                (sum + pixels[there], base + bases[there])
+            });
+            pixels[at] = bases[at] * (sum / base);
         }
         ring.iter().for_each(|&at| known[at] = true);
         let after = |&at: &usize| beside(at).filter(move |&next| alike(next, at));
@@ -92,5 +100,19 @@ fn fill(pixels: &mut [Vec3], known: &mut [bool], size: UVec2, alike: impl Fn(usi
         next.sort_unstable();
         next.dedup();
         ring = next;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bright_sample_of_a_dark_texel_does_not_dazzle_its_neighbours() {
+        // Dark with a sample of what is beside it, white without one, white.
+        let bases = [DARK, 0.8, 0.8].map(Vec3::splat);
+        let mut pixels = [0.64, 0.0, 0.64].map(Vec3::splat);
+        fill(&mut pixels, &bases, &mut [true, false, true], UVec2::new(3, 1), |_, _| true);
+        assert!((pixels[1].x / 0.64 - 1.78).abs() < 0.01, "{}: means of ratios make 2.3 of it", pixels[1]);
     }
 }

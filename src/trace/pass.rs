@@ -156,7 +156,12 @@ fn far_apart(film: &mut Film, together: u32) -> Vec<&mut Tile> {
             (spread(x ^ y) | spread(y) << 1).reverse_bits()
         });
     }
-    tiles
+    // Each thread has a piece of the list: dealt out, so that all go through the whole picture together.
+    let hands = if is_first { rayon::current_num_threads().next_power_of_two() } else { 1 };
+    let mut dealt: Vec<Vec<&mut Tile>> =
+        (0..hands).map(|_| Vec::with_capacity(tiles.len() / hands + 16)).collect();
+    tiles.into_iter().enumerate().for_each(|(i, tile)| dealt[(i >> (2 * together)) % hands].push(tile));
+    dealt.into_iter().flatten().collect()
 }
 
 /// Brings all tiles to their share of `until` samples per pixel, `step` samples at a time, as long as `keep_going`.

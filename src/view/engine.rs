@@ -160,12 +160,10 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                     Err(RecvTimeoutError::Disconnected) => return,
                 }
             }
+            let is_behind = !waiting.is_empty();
             // Lowered before the commands are read: one that comes later raises it again.
             self.interrupt.store(false, Ordering::SeqCst);
             waiting.extend(self.commands.try_iter());
-            if waiting.iter().any(|command| matches!(command, Command::Quit)) {
-                return;
-            }
             let commands = of_one_frame(&mut waiting);
             if !waiting.is_empty() {
                 self.interrupt.store(true, Ordering::SeqCst);
@@ -173,6 +171,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             let mut wanted = None;
             for command in commands {
                 match command {
+                    Command::Quit => return,
                     Command::Open(path) => wanted = Some(Some(path)),
                     Command::FilesChanged => files.look(),
                     Command::Tap { press, .. } if press.tap == Tap::Reload => wanted = Some(None),
@@ -197,7 +196,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             let app = &mut app;
             let now = Instant::now();
             let mut input = app.world.resource_mut::<Input>();
-            input.hold_until(now);
+            input.hold_until(counted_until(&waiting, now));
             let plays = app.world.resource::<Clock>().runs();
             let input = app.world.resource::<Input>();
             let moving = plays || input.is_moving() || input.has_motion();
@@ -233,6 +232,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             let shown = app.world.resource::<Picture>().version;
             if self.await_presented(shown, moving)
                 && shown != version
+                && !is_behind
                 && let Some(asked) = asked
             {
                 let known = app.world.resource::<FrameStats>().preview_seconds
@@ -398,6 +398,14 @@ fn of_one_frame(waiting: &mut VecDeque<Command>) -> Vec<Command> {
     let waits = |command: &Command| matches!(command, Command::Tap { press, .. } if Some(press.tap) != first);
     let count = waiting.iter().skip(1).position(waits).map_or(waiting.len(), |others| others + 1);
     waiting.drain(..count).collect()
+}
+
+/// Until when keys that are held count in this frame: what happens from the next key on comes with that one's frame.
+fn counted_until(waiting: &VecDeque<Command>, now: Instant) -> Instant {
+    match waiting.front() {
+        Some(Command::Tap { at, .. }) => now.min(*at),
+        _ => now,
+    }
 }
 
 /// Applies `command`; the first question for another view is remembered in `asked`.

@@ -203,7 +203,7 @@ impl Film {
         self.working().map(seen).sum::<usize>() as f64 / pixels as f64
     }
 
-    /// Whether it has pixels that nobody has looked at yet.
+    /// Whether it has pixels that nobody has looked at yet, and all of the picture is wanted.
     #[must_use]
     pub fn has_gaps(&self) -> bool {
         self.complete_samples() == 0 && self.region().is_none()

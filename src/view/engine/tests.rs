@@ -114,6 +114,36 @@ fn keys_between_two_frames_act_in_their_order() {
     assert_eq!(frames(vec![held(), drag(), drag(), tap(Tap::PrintCamera), held()]), [3, 2]);
 }
 
+/// However many frames the keys before it take.
+#[test]
+fn a_key_that_is_held_between_others_counts_for_as_long_as_it_was() {
+    let start = Instant::now();
+    let at = |ms| start + Duration::from_millis(ms);
+    let tap = |tap: Tap, ms| Command::Tap { press: tap.into(), at: at(ms) };
+    let held = |is: bool, ms| {
+        let mut held = [false; Hold::COUNT];
+        held[Hold::Forward as usize] = is;
+        Command::Held { held, at: at(ms) }
+    };
+    let seconds = |commands: Vec<Command>| {
+        let (mut waiting, mut input, mut sum) = (VecDeque::from(commands), Input::new(start), 0.0);
+        while !waiting.is_empty() {
+            for command in of_one_frame(&mut waiting) {
+                input.apply(&command);
+            }
+            input.hold_until(counted_until(&waiting, at(500)));
+            sum += input.seconds(Hold::Forward);
+            input.end_frame();
+        }
+        sum
+    };
+    let [a, b] = [Tap::FrameAll, Tap::ResetCamera];
+    let behind = seconds(vec![tap(a, 10), tap(b, 20), held(true, 30), held(false, 50)]);
+    assert!((behind - 0.02).abs() < 1e-9, "{behind}");
+    let around = seconds(vec![held(true, 10), tap(a, 20), held(false, 30)]);
+    assert!((around - 0.02).abs() < 1e-9, "{around}");
+}
+
 #[test]
 fn a_camera_that_is_copied_or_remembered_is_where_it_has_moved_to() {
     let source = SceneSource::parse("cornell").unwrap();
