@@ -311,6 +311,7 @@ macro_rules! pair_lanes {
         }
     };
 }
+#[cfg(target_arch = "x86_64")]
 pub(super) use pair_lanes;
 
 pair_lanes!(One, 1);
