@@ -74,7 +74,7 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
         PictureFormat::Png => return write_png(path, film.size(), develop(film, None, display)),
         PictureFormat::Exr => linear_pixels(film),
     };
-    write_exr(path, film.size(), pixels)
+    write_exr(path, film.size(), &pixels)
 }
 
 /// The same of a picture.
@@ -84,7 +84,7 @@ pub fn save(path: &Path, film: &Film, display: &Display) -> Result<(), ImageErro
 pub fn save_image(path: &Path, image: &LinearImage, display: &Display) -> Result<(), ImageError> {
     match PictureFormat::of(path)? {
         PictureFormat::Png => write_png(path, image.size, develop_image(image, display)),
-        PictureFormat::Exr => write_exr(path, image.size, image.pixels.clone()),
+        PictureFormat::Exr => write_exr(path, image.size, &image.pixels),
     }
 }
 
@@ -93,8 +93,8 @@ fn write_png(path: &Path, size: UVec2, rgba: Vec<u8>) -> Result<(), ImageError> 
     encode(path, &image::DynamicImage::from(image).into_rgb8().into(), ImageFormat::Png)
 }
 
-fn write_exr(path: &Path, size: UVec2, pixels: Vec<Vec3>) -> Result<(), ImageError> {
-    let linear = pixels.into_iter().flat_map(|p| p.to_array()).collect();
+fn write_exr(path: &Path, size: UVec2, pixels: &[Vec3]) -> Result<(), ImageError> {
+    let linear = pixels.iter().flat_map(Vec3::to_array).collect();
     let image = Rgb32FImage::from_raw(size.x, size.y, linear).unwrap_or_default();
     encode(path, &image.into(), ImageFormat::OpenExr)
 }

@@ -84,8 +84,7 @@ impl<'a> Grid<'a> {
         let took = start.elapsed().as_secs_f64();
         left -= took;
         note(&mut pace.place, took, blocks.len());
-        // Planes must go on to the four blocks beside: what only touches the corner of a block is found by the next step, and
-        // asking all eight makes more blocks edges than there is time for.
+        // Planes must go on to the four blocks beside. What only touches the corner of a block is found with the next step.
         let mut edges = vec![false; blocks.len()];
         edges.par_chunks_exact_mut(width).zip(0..size.y as usize).for_each(|(edges, y)| {
             for (x, edge) in edges.iter_mut().enumerate() {

@@ -285,8 +285,7 @@ pub fn keep(
         // What a lens shows of a point, it shows from there only.
         let can_carry =
             !is_other && shown.is_whole && !scene.viewpoint.has_lens() && shown.size == film.size();
-        let can_carry = can_carry && !shown.only_film;
-        if can_carry && shown.viewpoint.is_some_and(|old| !old.has_lens()) {
+        if can_carry && !shown.only_film && shown.viewpoint.is_some_and(|old| !old.has_lens()) {
             let start = Instant::now();
             let seconds = CARRYING * preview.target();
             shown.carry(&scene, preview.film(), seconds);
