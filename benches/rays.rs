@@ -51,6 +51,21 @@ fn build(criterion: &mut Criterion) {
     }
 }
 
+/// A mesh that is bent: its hierarchy with new boxes, beside a new one.
+fn refit(criterion: &mut Criterion) {
+    let triangles = terrain(300);
+    let bent: Vec<[Vec3; 3]> =
+        triangles.iter().map(|corners| corners.map(|p| p + Vec3::X * 0.1 * (p.y + p.z).sin())).collect();
+    let blas = Blas::build(&triangles);
+    let refitted = blas.refit(&bent).expect("bent a little");
+    compare_with_all(&refitted, &bent, &ray_kinds(&refitted, 64)[2].1, 64);
+    let mut group = criterion.benchmark_group("bend");
+    group.throughput(Throughput::Elements(triangles.len() as u64));
+    group.bench_function("refit", |bencher| bencher.iter(|| blas.refit(black_box(&bent))));
+    group.bench_function("build", |bencher| bencher.iter(|| Blas::build(black_box(&bent))));
+    group.finish();
+}
+
 /// What has to be done when one of a thousand instances moved.
 fn move_instance(criterion: &mut Criterion) {
     let triangles = terrain(30);
@@ -77,6 +92,6 @@ fn move_instance(criterion: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = build, trace, move_instance
+    targets = build, refit, trace, move_instance
 }
 criterion_main!(benches);

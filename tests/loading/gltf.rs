@@ -216,6 +216,7 @@ fn damaged_accessors_and_containers_are_refused_with_their_place() {
     );
     assert_says(&refusal("a.gltf", &good.replace(r#""POSITION":0"#, r#""POSITION":9"#)), "accessor 9 of 3");
     assert_says(&refusal("a.gltf", &good.replace(r#""version":"2.0""#, r#""version":"1.0""#)), "version 1.0");
+    assert_says(&refusal("a.gltf", &good.replace(r#""version":"2.0""#, r#""version":1"#)), "version 1;");
     assert_says(&refusal("a.gltf", &good[..good.len() / 2]), "JSON");
     assert_says(&refusal("a.glb", "glTF\u{2}\0\0\0\u{7f}\0\0\0"), "truncated");
     assert_says(&refusal("a.glb", ""), "empty");
@@ -239,6 +240,14 @@ fn binary_data_right_behind_text_of_an_odd_length_is_found() {
         let (_, report) = loaded_all(&[("a.glb", &[head, body].concat())]);
         assert_eq!(report.triangles, 1, "{spaces}");
     }
+}
+
+#[test]
+fn a_scene_may_be_empty() {
+    let (_, report) =
+        loaded_all(&[("a.gltf", br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"name":"bare"}]}"#)]);
+    assert_eq!(report.triangles, 0);
+    assert_says(&report.warnings().concat(), "no triangle to see");
 }
 
 #[test]

@@ -27,6 +27,17 @@ fn gloss_has_its_colour_and_its_exponent_from_pictures() {
 }
 
 #[test]
+fn a_picture_is_seen_where_its_colour_is_black() {
+    let (mut world, report) = material("Kd 0 0 0\nmap_Kd red.png");
+    assert_says(&report.warnings().concat(), "Kd is black");
+    let seen = named::<Material>(&mut world, "m");
+    assert_eq!(seen.base_color, Vec3::ONE);
+    assert_eq!(texel(&world, seen.base_color_texture), ([200, 100, 50, 255], Encoding::Srgb));
+    // Without a picture black is black.
+    assert_eq!(named::<Material>(&mut material("Kd 0 0 0").0, "m").base_color, Vec3::ZERO);
+}
+
+#[test]
 fn metal_roughness_varnish_cloth_and_brush_make_a_layered_surface() {
     let (mut world, report) =
         material("Pr 0.5\nPm 0.25\nPc 1\nPcr 0.1\nPs 0.5\naniso 0.7\nanisor 0.25\nNi 1.8\nmap_Pr red.png");

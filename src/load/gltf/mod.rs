@@ -228,8 +228,9 @@ struct Head {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct HeadAsset {
-    version: Option<String>,
-    min_version: Option<String>,
+    /// A string, in files of version 1 also a number.
+    version: Option<serde_json::Value>,
+    min_version: Option<serde_json::Value>,
 }
 
 fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadError> {
@@ -241,15 +242,22 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
     })
 }
 
-/// The whole tree; once more without animations if it fails, because `gltf::json` knows only those of nodes.
+/// The whole tree; once more without what `gltf::json` knows less of than the format if it fails: animations, of
+/// which it has only those of nodes, and scenes, to which it denies being empty.
 fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
     let first = match parse(file, json) {
         Ok(tree) => return Ok(tree),
         Err(first) => first,
     };
     let mut value: serde_json::Value = parse(file, json)?;
-    let animations = value.as_object_mut().and_then(|root| root.remove("animations"));
-    animations.and_then(|_| serde_json::from_value(value).ok()).ok_or(first)
+    if let Some(root) = value.as_object_mut() {
+        root.remove("animations");
+        let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
+        for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
+            scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
+        }
+    }
+    serde_json::from_value(value).map_err(|_| first)
 }
 
 /// Refuses other versions and required extensions; warns of extensions that are merely used.
@@ -258,7 +266,11 @@ fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadEr
         return Err(LoadError::broken(file, "content", "the JSON is empty"));
     }
     let head: Head = parse(file, json)?;
-    let version = |text: Option<String>| text.unwrap_or_else(|| "missing".to_owned());
+    let version = |value: Option<serde_json::Value>| match value {
+        Some(serde_json::Value::String(text)) => text,
+        Some(other) => other.to_string(),
+        None => "missing".to_owned(),
+    };
     let Some(asset) = head.asset else {
         return Err(LoadError::broken(file, "asset", "not a glTF file: no `asset` with a version"));
     };

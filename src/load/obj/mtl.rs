@@ -240,6 +240,12 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     }
     let model = material.illumination_model.unwrap_or(2);
     let is_glass = matches!(model, 4 | 6 | 7 | 9);
+    if has_texture && !is_glass && diffuse == Vec3::ZERO {
+        // So some exporters say that the picture alone counts; a product with it nobody means.
+        let what = "Kd is black, and map_Kd would not be seen: as if it were white";
+        sink.repaired(file, &format!("material `{name}`"), what);
+        diffuse = Vec3::ONE;
+    }
     let is_mirror = matches!(model, 3 | 5) && specular != Vec3::ZERO;
     let uses_specular = pbr.is_none() && !is_glass && (is_mirror || (model >= 2 && specular != Vec3::ZERO));
     let most = (diffuse + specular).max_element();
