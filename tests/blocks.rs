@@ -36,7 +36,7 @@ fn points_of_a_block_are_those_of_single_hits() {
         let places = (0..LANES).map(|i| Vec2::new(i as f32 + 0.3, 0.6));
         let rays: Vec<Ray> = places.map(|place| scene.viewpoint.ray(place, scene.settings.size)).collect();
         let mut hits = vec![None; LANES];
-        scene.closest_hits(&rays, &mut hits, |_, _| 0.5);
+        scene.closest_hits(&rays, &mut hits, |_| true, |_, _| 0.5);
         let is_there = scene.geometry.tlas.placements()[0].is_identity();
         let placed = (!is_there).then(|| Placed {
             world_from_local: *scene.geometry.tlas.placements()[0].world_from_local(),

@@ -55,7 +55,8 @@ fn a_picture_far_off_is_exposed_and_a_good_one_is_not() {
     let stops = scene.app.world.resource::<Display>().exposure;
     assert!((-14.0..-6.0).contains(&stops), "{stops}");
     assert!(says(&scene.report, "exposed by -"));
-    let scene = opened("good", &floor_and_lamp(1.0), MTL);
+    let good = MTL.replace("Ke 5 5 5", "Ke 1 1 1");
+    let scene = opened("good", &floor_and_lamp(1.0), &good);
     assert_eq!(scene.app.world.resource::<Display>().exposure, 0.0, "{:?}", scene.report.decisions());
 }
 

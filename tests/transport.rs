@@ -94,7 +94,7 @@ fn every_way_of_sampling_finds_the_same_light() {
     let scene = stage.scene();
     let ray = scene.viewpoint.ray(Vec2::splat(8.0), scene.settings.size);
     let mut hit = [None];
-    scene.closest_hits(&[ray], &mut hit, |_, _| 0.0);
+    scene.closest_hits(&[ray], &mut hit, |_| true, |_, _| 0.0);
     let hit = hit[0].expect("the floor");
     let (instance, surface) = scene.surface_at(&hit);
     let at = Interaction::new(&scene, instance, &hit, &ray);

@@ -44,6 +44,7 @@ pub(super) struct Mended {
     pub(super) normals: usize,
     pub(super) uvs: usize,
     pub(super) colors: usize,
+    pub(super) turned: usize,
 }
 
 impl Mended {
@@ -56,6 +57,7 @@ impl Mended {
             (self.normals, "vertex normals zero or not finite, replaced by those of the faces"),
             (self.uvs, "texture coordinates not finite, set to 0"),
             (self.colors, "vertex colours not finite, set to white"),
+            (self.turned, "triangles whose corners go round against their normals, turned over"),
         ];
         for (count, what) in kinds.into_iter().filter(|(count, _)| *count > 0) {
             sink.remark(Kind::Repaired, file, place, what.to_owned(), count);
@@ -162,6 +164,7 @@ pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
     mended.too_far = if all_near { 0 } else { retain(&mut mesh, |corners| corners.iter().all(is_near)) };
     mended.without_area = if keep_flat { 0 } else { mesh.drop_degenerate() };
     mend_normals(&mut mesh, &mut mended);
+    mended.turned = turn_to_normals(&mut mesh);
     for uv in mesh.uvs.iter_mut().chain(&mut mesh.second_uvs) {
         if !uv.is_finite() {
             *uv = Vec2::ZERO;
@@ -194,6 +197,25 @@ fn retain(mesh: &mut TriangleMesh, mut pass: impl FnMut([Vec3; 3]) -> bool) -> u
         mesh.slots.retain(|_| kept.next().unwrap_or(true));
     }
     dropped
+}
+
+/// Turns triangles over that none of their normals agrees with, as mirrored exports and some CAD programs leave them: else their
+/// normals would be those of the other side. Returns how many.
+fn turn_to_normals(mesh: &mut TriangleMesh) -> usize {
+    let (positions, normals) = (&mesh.positions, &mesh.normals);
+    if normals.is_empty() {
+        return 0;
+    }
+    let turn = |corners: &mut [u32; 3]| {
+        let [a, b, c] = corners.map(|i| positions[i as usize]);
+        let facet = (b - a).cross(c - a);
+        let is_against = corners.iter().all(|&i| normals[i as usize].dot(facet) < 0.0);
+        if is_against {
+            corners.swap(1, 2);
+        }
+        usize::from(is_against)
+    };
+    mesh.triangles.par_iter_mut().with_min_len(MANY).map(turn).sum()
 }
 
 /// Unit length for all; what has no direction gets the mean normal of its faces.
@@ -258,6 +280,17 @@ mod tests {
             Part { normals: Some(vec![Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X * 3.0]), ..triangle(0.0) };
         let done = finish(merge(vec![part]), false);
         assert_eq!(done.mesh.normals, [Vec3::Z, Vec3::Z, Vec3::X]);
+    }
+
+    #[test]
+    fn a_triangle_goes_round_as_its_normals_say() {
+        let around = |normals: [Vec3; 3]| {
+            let done = finish(merge(vec![Part { normals: Some(normals.to_vec()), ..triangle(0.0) }]), false);
+            (done.mesh.triangles[0], done.mended.turned)
+        };
+        assert_eq!(around([Vec3::Z; 3]), ([0, 1, 2], 0));
+        assert_eq!(around([Vec3::NEG_Z; 3]), ([0, 2, 1], 1));
+        assert_eq!(around([Vec3::NEG_Z, Vec3::NEG_Z, Vec3::Z]), ([0, 1, 2], 0));
     }
 
     #[test]

@@ -84,12 +84,37 @@ fn texel_count(bytes: &[u8]) -> Option<u64> {
     if let Some([width, height]) = ktx2::size(bytes) {
         return Some(u64::from(width) * u64::from(height));
     }
-    let (width, height) =
-        ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?.into_dimensions().ok()?;
+    let (width, height) = reader_of(bytes).ok()?.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
 }
 
-/// Decodes one picture, by its first bytes and not by its name.
+/// By the first bytes and not by the name; TGA has none of its own, but a header in which little is possible.
+fn reader_of(bytes: &[u8]) -> std::io::Result<ImageReader<Cursor<&[u8]>>> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    if reader.format().is_none() && is_targa(bytes) {
+        reader.set_format(ImageFormat::Tga);
+    }
+    Ok(reader)
+}
+
+fn is_targa(bytes: &[u8]) -> bool {
+    let Some(&[_, map, kind, _, _, _, _, map_depth, _, _, _, _, w0, w1, h0, h1, depth, _]) =
+        bytes.first_chunk()
+    else {
+        return false;
+    };
+    let indexed = matches!(kind, 1 | 9);
+    let depths: &[u8] = match kind {
+        1 | 3 | 9 | 11 => &[8, 16],
+        2 | 10 => &[15, 16, 24, 32],
+        _ => &[],
+    };
+    let has_size = u16::from_le_bytes([w0, w1]) > 0 && u16::from_le_bytes([h0, h1]) > 0;
+    let has_map = map == 1 && matches!(map_depth, 15 | 16 | 24 | 32);
+    has_size && depths.contains(&depth) && (has_map || !indexed && map == 0)
+}
+
+/// Decodes one picture.
 fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels, String> {
     if ktx2::size(bytes).is_some() {
         return ktx2::decode(bytes, MOST_TEXELS);
@@ -97,9 +122,7 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels,
     if let Some(format) = foreign_format(bytes) {
         return Err(format!("image format {format} is not supported"));
     }
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| format!("image cannot be read: {error}"))?;
+    let reader = reader_of(bytes).map_err(|error| format!("image cannot be read: {error}"))?;
     let Some(format) = reader.format() else {
         return Err("image format not recognised".to_owned());
     };

@@ -1,10 +1,10 @@
 //! Tangents for normal maps, where a file has none: Mikkelsen's, which those who bake such maps use too.
 
 use super::report::{Kind, Sink};
-use crate::scene::{Material, TriangleMesh};
+use crate::scene::{Material, TextureUse, TriangleMesh};
 use bevy_ecs::prelude::*;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Mat2, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 
 /// Gives tangents to the triangles whose material of `materials`, by slot, has a normal map; `place` names the
@@ -17,7 +17,7 @@ pub(super) fn complete_for(
     sink: &mut Sink<'_>,
 ) {
     let world = &*sink.world;
-    let wants: Vec<_> =
+    let wants: Vec<Option<Directed>> =
         materials.iter().map(|material| world.get::<Material>(*material).and_then(directed)).collect();
     if wants.iter().all(Option::is_none) {
         // Nobody will look at them.
@@ -32,25 +32,41 @@ pub(super) fn complete_for(
     }
 }
 
-/// Whether a material has directions along its surface, and whether by the second texture coordinates.
-fn directed(material: &Material) -> Option<bool> {
+/// By which texture coordinates a material has directions along its surface.
+#[derive(Clone, Copy, PartialEq)]
+struct Directed {
+    second_uvs: bool,
+    /// Texture from mesh: directions are those of the picture, however it is turned.
+    turned: Mat2,
+}
+
+impl Directed {
+    const PLAIN: Self = Self { second_uvs: false, turned: Mat2::IDENTITY };
+}
+
+impl From<TextureUse> for Directed {
+    fn from(texture: TextureUse) -> Self {
+        Self { second_uvs: texture.second_uvs, turned: texture.uv_transform.matrix2 }
+    }
+}
+
+fn directed(material: &Material) -> Option<Directed> {
     let layers = material.layers.as_ref();
     let coat = layers.and_then(|layers| layers.clearcoat.as_ref()?.normal_map);
-    let map = material.normal_map.or(coat).map(|map| map.texture.second_uvs);
+    let map = material.normal_map.or(coat).map(|map| map.texture.into());
     map.or_else(|| {
         let brushed = layers?.anisotropy.as_ref()?;
-        Some(brushed.texture.is_some_and(|texture| texture.second_uvs))
+        Some(brushed.texture.map_or(Directed::PLAIN, Directed::from))
     })
 }
 
 /// Gives tangents to the triangles that want and have none; returns how many corners remain without, for
 /// their texture coordinates have no area. A vertex whose triangles disagree is split.
 ///
-/// `wants` says for each slot whether there is a normal map, and whether it lies on the second set of texture
-/// coordinates.
+/// `wants` says for each slot whether there is a normal map, and by which coordinates.
 ///
 /// Reference: M. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008; glTF 2.0 specification, 3.7.2.1.
-fn complete(mesh: &mut TriangleMesh, wants: &[Option<bool>]) -> usize {
+fn complete(mesh: &mut TriangleMesh, wants: &[Option<Directed>]) -> usize {
     let mut without = 0;
     for second_uvs in [false, true] {
         let faces = bare_faces(mesh, wants, second_uvs);
@@ -60,7 +76,7 @@ fn complete(mesh: &mut TriangleMesh, wants: &[Option<bool>]) -> usize {
             continue;
         }
         let tangents = vec![[Vec4::ZERO; 3]; faces.len()];
-        let mut made = Made { mesh, uvs, faces, tangents };
+        let mut made = Made { mesh, wants, uvs, faces, tangents };
         // Its error has no kinds yet; without an answer the tangents stay zero.
         let _ = generate_tangents(&mut made);
         let Made { faces, tangents, .. } = made;
@@ -71,9 +87,9 @@ fn complete(mesh: &mut TriangleMesh, wants: &[Option<bool>]) -> usize {
 }
 
 /// Triangles that want tangents by this set of texture coordinates.
-fn bare_faces(mesh: &TriangleMesh, wants: &[Option<bool>], second_uvs: bool) -> Vec<usize> {
+fn bare_faces(mesh: &TriangleMesh, wants: &[Option<Directed>], second_uvs: bool) -> Vec<usize> {
     let is_bare = |corner: &u32| mesh.tangents.get(*corner as usize).is_none_or(|t| *t == Vec4::ZERO);
-    let wanted = |slot: usize| wants.get(slot).copied().flatten() == Some(second_uvs);
+    let wanted = |slot: usize| wants.get(slot).copied().flatten().is_some_and(|d| d.second_uvs == second_uvs);
     (0..mesh.triangles.len())
         .filter(|&i| wanted(mesh.slot(i)) && mesh.triangles[i].iter().all(is_bare))
         .collect()
@@ -82,6 +98,7 @@ fn bare_faces(mesh: &TriangleMesh, wants: &[Option<bool>], second_uvs: bool) -> 
 /// What is asked of the mesh, and the answers.
 struct Made<'a> {
     mesh: &'a TriangleMesh,
+    wants: &'a [Option<Directed>],
     uvs: &'a [Vec2],
     faces: Vec<usize>,
     tangents: Vec<[Vec4; 3]>,
@@ -113,7 +130,8 @@ impl Geometry for Made<'_> {
 
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
         // Mikkelsen's v grows upward, glTF's downward.
-        let uv = self.uvs[self.corner(face, corner)];
+        let wanted = self.wants.get(self.mesh.slot(self.faces[face])).copied().flatten();
+        let uv = wanted.unwrap_or(Directed::PLAIN).turned * self.uvs[self.corner(face, corner)];
         [uv.x, 1.0 - uv.y]
     }
 

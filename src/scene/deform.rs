@@ -86,6 +86,9 @@ impl Deform {
             add(&mut mesh.positions, &target.positions, weight);
             add(&mut mesh.normals, &target.normals, weight);
         }
+        if !mesh.tangents.is_empty() && weights.iter().any(|&weight| weight != 0.0) {
+            carry_tangents(&self.rest, &mut mesh);
+        }
         if let (Some(skin), Some(matrices)) = (&self.skin, mesh_from_bind) {
             mesh.tangents.par_iter_mut().enumerate().for_each(|(i, tangent)| {
                 if let Some(carrier) = skin.influences.carrier(i, matrices) {
@@ -117,17 +120,36 @@ impl Deform {
                 *normal = normal.as_dvec3().try_normalize().map_or(rest, DVec3::as_vec3);
             }
         });
-        if let Some((skin, matrices)) = self.skin.as_ref().zip(mesh_from_bind) {
-            for (i, tangent) in mesh.tangents.iter_mut().enumerate() {
-                if let Some(carrier) = skin.influences.carrier(i, matrices) {
-                    let along = carrier.matrix3 * tangent.truncate().as_dvec3();
-                    // A mirroring pose turns the cross product of normal and tangent round.
-                    let side = tangent.w * carrier.matrix3.determinant().signum() as f32;
-                    *tangent = along.normalize_or_zero().as_vec3().extend(side);
-                }
-            }
-        }
         mesh
+    }
+}
+
+/// Tangents as the triangles around them take them along from `rest` to the shape of `mesh`.
+fn carry_tangents(rest: &TriangleMesh, mesh: &mut TriangleMesh) {
+    let mut carried = vec![DVec3::ZERO; mesh.tangents.len()];
+    for (i, corners) in rest.triangles.iter().enumerate() {
+        let edges = |mesh: &TriangleMesh| {
+            let [a, b, c] = mesh.corners(i).map(Vec3::as_dvec3);
+            [b - a, c - a]
+        };
+        let ([u, v], [to_u, to_v]) = (edges(rest), edges(mesh));
+        let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
+        let area = uu * vv - uv * uv;
+        if area <= 0.0 {
+            continue;
+        }
+        for &corner in corners {
+            // The tangent as a sum of both edges.
+            let tangent = rest.tangents[corner as usize].truncate().as_dvec3();
+            let (along_u, along_v) = (tangent.dot(u), tangent.dot(v));
+            let (a, b) = ((along_u * vv - along_v * uv) / area, (along_v * uu - along_u * uv) / area);
+            carried[corner as usize] += to_u * a + to_v * b;
+        }
+    }
+    for (tangent, carried) in mesh.tangents.iter_mut().zip(carried) {
+        if let Some(unit) = carried.try_normalize() {
+            *tangent = unit.as_vec3().extend(tangent.w);
+        }
     }
 }
 
@@ -222,5 +244,40 @@ mod tests {
         assert!((shape.positions[1] - Vec3::new(1.0, 0.0, 1.0)).length() < 1e-6, "{}", shape.positions[1]);
         assert!((shape.normals[1] - Vec3::NEG_Y).length() < 1e-6);
         assert_eq!((shape.positions[2], shape.normals[2]), (Vec3::X * 2.0, Vec3::Z));
+    }
+
+    /// A triangle with tangents along +X.
+    fn brushed() -> TriangleMesh {
+        TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z; 3],
+            tangents: vec![Vec3::X.extend(1.0); 3],
+            triangles: vec![[0, 1, 2]],
+            ..TriangleMesh::default()
+        }
+    }
+
+    #[test]
+    fn tangents_turn_once_with_their_joint() {
+        let influences = Influences { per_vertex: 1, joints: vec![0; 3], weights: vec![1.0; 3] };
+        let skin = Skin { joints: Vec::new(), influences, space: Entity::PLACEHOLDER };
+        let deform = Deform { rest: Arc::new(brushed()), skin: Some(skin), ..line() };
+        let turn = DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2);
+        let shape = deform.shape(&[], Some(&[turn]));
+        assert!((shape.tangents[1] - Vec3::Y.extend(1.0)).length() < 1e-6, "{}", shape.tangents[1]);
+        let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        let shape = deform.shape(&[], Some(&[mirror]));
+        assert_eq!(shape.tangents[1], Vec3::NEG_X.extend(-1.0));
+    }
+
+    #[test]
+    fn tangents_go_with_the_shape_of_a_target() {
+        // Half a turn about +Z.
+        let positions = brushed().positions.iter().map(|p| -2.0 * *p).collect();
+        let turned = Target { positions, normals: Vec::new() };
+        let deform = Deform { rest: Arc::new(brushed()), targets: vec![turned], ..line() };
+        let shape = deform.shape(&[1.0], None);
+        assert_eq!(shape.positions[1], Vec3::NEG_X);
+        assert!((shape.tangents[2] - Vec3::NEG_X.extend(1.0)).length() < 1e-6, "{}", shape.tangents[2]);
     }
 }

@@ -31,8 +31,10 @@ pub struct Material {
     pub alpha: Alpha,
     /// Coverage factor in 0..=1, times the base colour texture's alpha.
     pub opacity: f32,
-    /// Whether the back emits too. (Reflection is always on both sides.)
+    /// Whether the back emits too. (Reflection is on both sides.)
     pub double_sided: bool,
+    /// Whether the eye and mirrors see through its back (glTF without `doubleSided`). Light does not go through.
+    pub culled: bool,
     /// Shows its base colour whatever the light (`KHR_materials_unlit`).
     pub unlit: bool,
 }
@@ -132,6 +134,7 @@ impl Default for Material {
             alpha: Alpha::Opaque,
             opacity: 1.0,
             double_sided: false,
+            culled: false,
             unlit: false,
         }
     }

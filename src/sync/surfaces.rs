@@ -95,11 +95,14 @@ pub fn sync_coverage(
     let is_opaque =
         |&m: &u32| surfaces.materials.get(m as usize).is_none_or(|s| s.material.alpha == Alpha::Opaque);
     let alpha = geometry.instances.iter().map(|data| !data.materials.iter().all(is_opaque)).collect();
+    let is_culled =
+        |&m: &u32| surfaces.materials.get(m as usize).is_some_and(|surface| surface.material.culled);
+    let culled = geometry.instances.iter().map(|data| data.materials.iter().any(is_culled)).collect();
     let mut lit = vec![false; geometry.instances.len()];
     for instance in lights.instances() {
         lit[instance as usize] = true;
     }
-    coverage.set_if_neq(Coverage { alpha, lights: lit });
+    coverage.set_if_neq(Coverage { alpha, culled, lights: lit });
 }
 
 fn white() -> Texture {

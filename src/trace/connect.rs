@@ -176,7 +176,10 @@ pub(super) fn mesh_emission(scene: &TraceScene, instance: u32, triangle: u32, sa
     let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
     let corners = data.mesh.triangles[triangle as usize];
     let uvs = super::scene::both_uvs(&data.mesh, corners, weights);
-    surface.material.emission * scene.texture(surface.emission_texture, uvs).truncate()
+    // Rays that run into it meet only what is there.
+    surface.material.emission
+        * scene.texture(surface.emission_texture, uvs).truncate()
+        * scene.coverage_at(&hit)
 }
 
 /// Weight of a sample of density `a` that might have been taken with density `b`.

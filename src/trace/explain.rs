@@ -116,7 +116,8 @@ pub fn explain(scene: &TraceScene, pixel: UVec2, samples: Range<u32>, far: f32) 
         batch.shadows.clear();
         for path in &paths {
             let mut hit = [None];
-            scene.closest_hits(&[path.ray], &mut hit, |_, key| path.sampler.hashed(key, path.depth));
+            let looks = |_| path.bounce.is_none();
+            scene.closest_hits(&[path.ray], &mut hit, looks, |_, key| path.sampler.hashed(key, path.depth));
             told.segments.push(path_segment(scene, path, hit[0].as_ref(), far));
             told.arrive(scene, &mut batch, path, hit[0]);
         }

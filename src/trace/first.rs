@@ -122,7 +122,7 @@ pub fn first_surfaces(scene: &TraceScene, places: &[Vec2], values: &mut [FirstSu
     let rays: Vec<Ray> = places.iter().map(|&place| scene.viewpoint.ray(place, size)).collect();
     let mut hits = vec![None; rays.len()];
     // What is there by half is there.
-    scene.closest_hits(&rays, &mut hits, |_, _| 0.5);
+    scene.closest_hits(&rays, &mut hits, |_| true, |_, _| 0.5);
     for ((value, ray), hit) in values.iter_mut().zip(&rays).zip(&hits) {
         *value = first_surface(scene, ray, hit.as_ref());
     }

@@ -287,7 +287,9 @@ impl Batch {
             let path = self.path(i);
             path.sampler.hashed(key, path.depth)
         };
-        scene.closest_hits(&self.rays, &mut hits, random);
+        // What was found by a light sample too has to be met by both alike.
+        let looks = |i: usize| self.paths.get(i).is_none_or(|path| path.bounce.is_none());
+        scene.closest_hits(&self.rays, &mut hits, looks, random);
         self.hits = hits;
         for i in 0..self.rays.len() {
             self.arrive(scene, i);

@@ -116,7 +116,7 @@ pub fn places(scene: &TraceScene, places: &[Vec2], values: &mut [Place]) {
     let rays: Vec<Ray> = places.iter().map(|&place| scene.viewpoint.ray(place, size)).collect();
     let mut hits = vec![None; rays.len()];
     // What is there by half is there.
-    scene.closest_hits(&rays, &mut hits, |_, _| 0.5);
+    scene.closest_hits(&rays, &mut hits, |_| true, |_, _| 0.5);
     // Most of the picture shows no lamp.
     let corner = |pick: fn(Vec2, Vec2) -> Vec2| places.iter().copied().reduce(pick).unwrap_or_default();
     // A row alone would have no inside.

@@ -51,6 +51,8 @@ impl Default for Surfaces {
 pub struct Coverage {
     /// By instance: whether some of its material lets rays through by chance or by a mask.
     pub alpha: Vec<bool>,
+    /// By instance: whether some of its material is not seen from behind.
+    pub culled: Vec<bool>,
     /// By instance: whether it has triangles that are sampled as lights, and are no occluders of themselves.
     pub lights: Vec<bool>,
 }
@@ -180,18 +182,52 @@ impl<'a> TraceScene<'a> {
         lookup(texture, filter, uv_transform.transform_point2(uvs[usize::from(second_uvs)]))
     }
 
-    /// For each ray the nearest hit that is there: what alpha lets through is not. `random` in [0, 1)
-    /// decides about partial coverage, as a function of the ray's number and the hit's key.
+    /// For each ray the nearest hit that is there: what alpha lets through is not, nor, where the ray `looks`, the back of what
+    /// is not seen from behind. `random` in [0, 1) decides about partial coverage, as a function of the ray's number and
+    /// the hit's key.
     pub fn closest_hits(
         &self,
         rays: &[Ray],
         hits: &mut [Option<Hit>],
+        looks: impl Fn(usize) -> bool,
         random: impl Fn(usize, u32) -> f32 + Sync,
     ) {
-        let covering = Covering { scene: self, ignored: &[], random };
+        let covering = Covering { scene: self, ignored: &[], looking: &[], random: &random };
         let asked = self.coverage.alpha.contains(&true);
         let covering: &dyn Accept = &covering;
         self.geometry.tlas.closest_hits(rays, hits, asked.then_some(covering));
+        if !self.coverage.culled.contains(&true) {
+            return;
+        }
+        // Hardly any ray meets a back first, so only these are asked all along their way.
+        let meets_back =
+            |&i: &usize| looks(i) && hits[i].is_some_and(|hit| self.is_unseen_back(&hit, &rays[i]));
+        let again: Vec<usize> = (0..rays.len()).filter(meets_back).collect();
+        if again.is_empty() {
+            return;
+        }
+        let looking: Vec<Ray> = again.iter().map(|&i| rays[i]).collect();
+        let mut found = vec![None; again.len()];
+        let random = |i: usize, key: u32| random(again[i], key);
+        let covering = Covering { scene: self, ignored: &[], looking: &looking, random };
+        self.geometry.tlas.closest_hits(&looking, &mut found, Some(&covering));
+        for (&i, hit) in again.iter().zip(found) {
+            hits[i] = hit;
+        }
+    }
+
+    /// Whether `ray` meets there the back of what is not seen from behind.
+    fn is_unseen_back(&self, hit: &Hit, ray: &Ray) -> bool {
+        if !self.coverage.culled.get(hit.instance as usize).is_some_and(|&culled| culled) {
+            return false;
+        }
+        let (instance, surface) = self.surface_at(hit);
+        if !surface.material.culled {
+            return false;
+        }
+        let [a, b, c] = instance.mesh.corners(hit.triangle as usize).map(Vec3::as_dvec3);
+        // The inverse transpose keeps sides, also under a mirroring placement.
+        (instance.normal_matrix * (b - a).cross(c - a)).dot(ray.direction.as_dvec3()) > 0.0
     }
 
     /// For each ray whether something is there, not counting the triangle `ignored` of it, (instance,
@@ -204,14 +240,15 @@ impl<'a> TraceScene<'a> {
         random: impl Fn(usize, u32) -> f32 + Sync,
     ) {
         let asked = self.coverage.alpha.contains(&true) || ignored.iter().any(Option::is_some);
-        let covering = Covering { scene: self, ignored, random };
+        let covering = Covering { scene: self, ignored, looking: &[], random };
         let covering: &dyn Accept = &covering;
         self.geometry.tlas.any_hits(rays, blocked, asked.then_some(covering));
     }
 
-    fn covers(&self, hit: &Hit, random: impl Fn(u32) -> f32) -> bool {
+    /// How much of it is there, 0 to 1.
+    pub(super) fn coverage_at(&self, hit: &Hit) -> f32 {
         let (instance, surface) = self.surface_at(hit);
-        let alpha = |()| {
+        let alpha = || {
             let corners = instance.mesh.triangles[hit.triangle as usize];
             let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
             let uvs = both_uvs(&instance.mesh, corners, weights);
@@ -219,9 +256,17 @@ impl<'a> TraceScene<'a> {
             surface.material.opacity * vertex * self.texture(surface.base_color_texture, uvs).w
         };
         match surface.material.alpha {
-            Alpha::Opaque => true,
-            Alpha::Mask(cutoff) => alpha(()) >= cutoff,
-            Alpha::Blend => random(hit.instance.wrapping_mul(0x9e37_79b9) ^ hit.triangle) < alpha(()),
+            Alpha::Opaque => 1.0,
+            Alpha::Mask(cutoff) => f32::from(u8::from(alpha() >= cutoff)),
+            Alpha::Blend => alpha().clamp(0.0, 1.0),
+        }
+    }
+
+    fn covers(&self, hit: &Hit, random: impl Fn(u32) -> f32) -> bool {
+        match self.coverage_at(hit) {
+            0.0 => false,
+            1.0 => true,
+            part => random(hit.instance.wrapping_mul(0x9e37_79b9) ^ hit.triangle) < part,
         }
     }
 }
@@ -231,6 +276,8 @@ struct Covering<'a, 's, R> {
     scene: &'a TraceScene<'s>,
     /// For each ray a triangle that doesn't count; or empty.
     ignored: &'a [Option<(u32, u32)>],
+    /// The rays, if they do not see backs that are not to be seen; or empty.
+    looking: &'a [Ray],
     random: R,
 }
 
@@ -238,11 +285,14 @@ impl<R: Fn(usize, u32) -> f32> Accept for Covering<'_, '_, R> {
     #[inline]
     fn asks(&self, instance: u32) -> bool {
         let set = |flags: &[bool]| flags.get(instance as usize).copied().unwrap_or(false);
-        set(&self.scene.coverage.alpha) || !self.ignored.is_empty() && set(&self.scene.coverage.lights)
+        set(&self.scene.coverage.alpha)
+            || !self.ignored.is_empty() && set(&self.scene.coverage.lights)
+            || !self.looking.is_empty() && set(&self.scene.coverage.culled)
     }
 
     fn takes(&self, ray: usize, hit: &Hit) -> bool {
         self.ignored.get(ray).copied().flatten() != Some((hit.instance, hit.triangle))
+            && !self.looking.get(ray).is_some_and(|ray| self.scene.is_unseen_back(hit, ray))
             && self.scene.covers(hit, |key| (self.random)(ray, key))
     }
 }

@@ -226,11 +226,12 @@ fn damaged_accessors_and_containers_are_refused_with_their_place() {
 fn binary_data_right_behind_text_of_an_odd_length_is_found() {
     let positions: Vec<u8> =
         [0_f32, 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|number| number.to_le_bytes()).collect();
-    for spaces in 0..4 {
+    // Zeros at the end, instead of blanks, are not as specified, and are met.
+    for (spaces, zeros) in [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (0, 3)] {
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":36}}],"bufferViews":[{{"buffer":0,"byteLength":36}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],"nodes":[{{"mesh":0}}]{}}}"#,
             " ".repeat(spaces)
-        );
+        ) + &"\0".repeat(zeros);
         let chunk = |kind: &[u8; 4], data: &[u8]| {
             [&(data.len() as u32).to_le_bytes(), kind.as_slice(), data].concat()
         };
@@ -238,8 +239,25 @@ fn binary_data_right_behind_text_of_an_odd_length_is_found() {
         let head =
             [b"glTF".as_slice(), &2_u32.to_le_bytes(), &(12 + body.len() as u32).to_le_bytes()].concat();
         let (_, report) = loaded_all(&[("a.glb", &[head, body].concat())]);
-        assert_eq!(report.triangles, 1, "{spaces}");
+        assert_eq!(report.triangles, 1, "{spaces}, {zeros}");
     }
+}
+
+#[test]
+fn coverage_sides_and_unlit_emission_are_as_specified() {
+    let material = |text: &str| {
+        let with = format!(r#","materials":[{text}]"#);
+        let (mut world, report) = loaded("a.gltf", &gltf_triangle("", r#","material":0"#, &with));
+        (world.query::<&Material>().single(&world).unwrap().clone(), report)
+    };
+    assert_eq!(material(r#"{"alphaMode":"MASK","alphaCutoff":1.5}"#).0.alpha, Alpha::Mask(1.5));
+    assert!(material("{}").0.culled);
+    assert!(!material(r#"{"doubleSided":true}"#).0.culled);
+    let glass = r#"{"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}}"#;
+    assert!(!material(glass).0.culled);
+    let unlit = r#"{"emissiveFactor":[1,1,1],"extensions":{"KHR_materials_unlit":{}}}"#;
+    assert_eq!(material(unlit).0.emission, Vec3::ZERO);
+    assert_says(&material(r#"{"alphaMode":"blend"}"#).1.warnings().concat(), "unknown alphaMode");
 }
 
 #[test]

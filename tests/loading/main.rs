@@ -12,6 +12,7 @@ mod layers;
 mod mtl_maps;
 mod normal_maps;
 mod obj;
+mod obj_wild;
 mod obj_words;
 mod settings;
 

@@ -1,6 +1,7 @@
 //! `check`.
 
 use crate::exit;
+use crate::print::line;
 use penumbra::cli::CheckArgs;
 use penumbra::load::{Card, Verdict};
 
@@ -12,11 +13,11 @@ pub fn run(args: &CheckArgs) -> u8 {
         let card = Card::check(file, &options);
         worst = worst.max(card.verdict);
         if !args.json {
-            println!("{}", card.text());
+            line(format_args!("{}", card.text()));
             continue;
         }
         match serde_json::to_string(&card) {
-            Ok(json) => println!("{json}"),
+            Ok(json) => line(format_args!("{json}")),
             Err(error) => return exit::because(&error, exit::FAILED),
         }
     }

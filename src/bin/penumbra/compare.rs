@@ -1,6 +1,7 @@
 //! `compare`.
 
 use crate::exit;
+use crate::print::line;
 use penumbra::cli::CompareArgs;
 use penumbra::image::compare::compare_files;
 
@@ -12,17 +13,17 @@ pub fn run(args: &CompareArgs) -> u8 {
     };
     if args.json {
         match serde_json::to_string(&difference) {
-            Ok(json) => println!("{json}"),
+            Ok(json) => line(format_args!("{json}")),
             Err(error) => return exit::because(&error, exit::FAILED),
         }
     } else {
         let [x, y] = difference.max_at;
-        println!("RMSE      {:.6e}", difference.rmse);
-        println!("relMSE    {:.6e}", difference.relative_mse);
-        println!("max error {:.6e} at pixel {x},{y}", difference.max_error);
-        println!("mean      {:+.6e}", difference.bias);
+        line(format_args!("RMSE      {:.6e}", difference.rmse));
+        line(format_args!("relMSE    {:.6e}", difference.relative_mse));
+        line(format_args!("max error {:.6e} at pixel {x},{y}", difference.max_error));
+        line(format_args!("mean      {:+.6e}", difference.bias));
         if difference.not_finite > 0 {
-            println!("{} values are not finite and were left out", difference.not_finite);
+            line(format_args!("{} values are not finite and were left out", difference.not_finite));
         }
     }
     let failed = |limit: f64| difference.not_finite > 0 || difference.rmse > limit;

@@ -2,6 +2,7 @@
 
 use crate::bar::Bar;
 use crate::exit;
+use crate::print::line;
 use crate::signal::{set_threads, stop_on_signals};
 use penumbra::cli::{OutputArgs, SceneArgs};
 use penumbra::farm::is_film;
@@ -117,7 +118,7 @@ fn finish(summary: &RenderSummary, output: &OutputArgs) -> u8 {
     }
     if output.json {
         match serde_json::to_string(summary) {
-            Ok(json) => println!("{json}"),
+            Ok(json) => line(format_args!("{json}")),
             Err(error) => return exit::because(&error, exit::FAILED),
         }
     }

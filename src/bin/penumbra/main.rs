@@ -6,6 +6,7 @@ mod compare;
 mod exit;
 mod headless;
 mod merge;
+mod print;
 mod report;
 mod signal;
 mod torture;
@@ -43,7 +44,7 @@ fn main() -> ExitCode {
         Some(Command::Torture(args)) => torture::run(&args),
         None if cli.window.list_scenes => {
             for scene in built_in_scenes() {
-                println!("{:<15} {}", scene.name, scene.description);
+                print::line(format_args!("{:<15} {}", scene.name, scene.description));
             }
             0
         }

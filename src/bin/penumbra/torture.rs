@@ -2,6 +2,7 @@
 
 use crate::bar::Bar;
 use crate::exit;
+use crate::print::line;
 use crate::signal::{set_threads, stop_on_signals};
 use crate::window;
 use clap::Parser;
@@ -15,7 +16,7 @@ pub fn run(args: &TortureArgs) -> u8 {
     let all = torture::cases();
     if args.list {
         for case in &all {
-            println!("{:<4} {}: {}", case.id, case.title, case.limit);
+            line(format_args!("{:<4} {}: {}", case.id, case.title, case.limit));
         }
         return 0;
     }
@@ -92,14 +93,14 @@ fn chosen(all: &[Case], wanted: &[String]) -> Result<Vec<Case>, String> {
 
 fn print(tried: &[Tried], args: &TortureArgs) -> serde_json::Result<()> {
     if args.json {
-        println!("{}", torture::json(tried)?);
+        line(format_args!("{}", torture::json(tried)?));
     } else if args.markdown {
-        print!("{}", torture::markdown(tried));
+        line(torture::markdown(tried).trim_end());
     } else {
         for [id, title, count, ours, limit, verdict] in torture::rows(tried) {
-            println!(
+            line(format_args!(
                 "{id:<4} {verdict:<7} {title}\n     tried {count}\n     ours  {ours}\n     limit {limit}"
-            );
+            ));
         }
     }
     Ok(())

@@ -71,7 +71,7 @@ pub fn run(args: &WindowArgs) -> u8 {
     match opened {
         Ok(response) => {
             if replays {
-                println!("{}", response.json());
+                crate::print::line(response.json());
             }
             0
         }

@@ -40,7 +40,11 @@ pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, Lo
             )));
         };
         match &kind.to_le_bytes() {
-            b"JSON" if json.is_none() => json = Some(data),
+            // Some writers fill up with zeros instead of blanks.
+            b"JSON" if json.is_none() => {
+                let end = data.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+                json = Some(&data[..end]);
+            }
             b"BIN\0" if binary.is_none() => binary = Some(data),
             _ => {} // The specification asks to skip what is not known.
         }

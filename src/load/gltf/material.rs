@@ -120,7 +120,11 @@ fn convert(
         (roughness, roughness_texture) = (rough, texture);
     }
     let strength = extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength.0);
-    let emission = Vec3::from(material.emissive_factor.0) * strength;
+    let emission = if unlit { Vec3::ZERO } else { Vec3::from(material.emissive_factor.0) * strength };
+    let passes_light = layers.as_ref().is_some_and(|layers| layers.transmission.is_some());
+    if material.alpha_mode == Checked::Invalid {
+        sink.repaired(document.file, &format!("material `{name}`"), "unknown alphaMode, opaque instead");
+    }
     let emission_is_legal = emission.is_finite() && emission.min_element() >= 0.0;
     if clamped.get() || !emission_is_legal {
         sink.repaired(document.file, &format!("material `{name}`"), "factor out of range, clamped");
@@ -150,12 +154,16 @@ fn convert(
             .filter(|_| emission != Vec3::ZERO)
             .and_then(|info| textures.get(info, Encoding::Srgb, sets, sink)),
         alpha: match material.alpha_mode {
-            Checked::Valid(AlphaMode::Mask) => Alpha::Mask(unit(material.alpha_cutoff.unwrap_or_default().0)),
+            // Above 1 nothing is there.
+            Checked::Valid(AlphaMode::Mask) => {
+                Alpha::Mask(material.alpha_cutoff.unwrap_or_default().0.max(0.0))
+            }
             Checked::Valid(AlphaMode::Blend) => Alpha::Blend,
             Checked::Valid(AlphaMode::Opaque) | Checked::Invalid => Alpha::Opaque,
         },
         opacity,
         double_sided: material.double_sided,
+        culled: !material.double_sided && !passes_light,
         unlit,
     }
 }

@@ -30,7 +30,8 @@ pub(super) fn spawn_scene(
     let roots = scene_roots(document, &parents, sink)?;
     let local: Vec<DAffine3> =
         (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
-    let order = visible(document, &roots, &parents, sink);
+    let order = top_down(document, &roots);
+    let hidden = hidden(document, &order, &parents, sink);
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
@@ -48,6 +49,9 @@ pub(super) fn spawn_scene(
         let name = Name::new(node.name.clone().unwrap_or_else(|| user.clone()));
         let entity = sink.spawn((name, Transform(local[i]), ChildOf(parent)));
         entities[i] = Some(entity);
+        if hidden[i] {
+            continue;
+        }
         if let Some(light) = light::light_of(document, node, &user, sink)? {
             sink.world.entity_mut(entity).insert(light);
         }
@@ -58,7 +62,7 @@ pub(super) fn spawn_scene(
     }
     for &i in &order {
         let (node, user) = (&nodes[i], format!("node {i}"));
-        let (Some(index), Some(entity)) = (&node.mesh, entities[i]) else { continue };
+        let (Some(index), Some(entity), false) = (&node.mesh, entities[i], hidden[i]) else { continue };
         let mesh = document.at(&document.root.meshes, index, "mesh", &user)?;
         let weights = deform::weights_of(node, mesh);
         let morphs = weights.iter().any(|&weight| weight != 0.0)
@@ -261,30 +265,27 @@ fn scene_roots(
     Ok(roots)
 }
 
-/// Of the nodes below the roots those that show (`KHR_node_visibility`), in the same order.
-fn visible(
+/// Which nodes do not show (`KHR_node_visibility`): they still stand where joints may need them.
+fn hidden(
     document: &Document<'_>,
-    roots: &[usize],
+    order: &[usize],
     parents: &[Option<usize>],
     sink: &mut Sink<'_>,
-) -> Vec<usize> {
+) -> Vec<bool> {
     let is_hidden = |i: usize| {
         let others = document.root.nodes[i].extensions.as_ref().map(|extensions| &extensions.others);
         let extension = others.and_then(|others| others.get("KHR_node_visibility"));
         extension.and_then(|e| e.get("visible")).is_some_and(|visible| visible == false)
     };
-    let mut order = top_down(document, roots);
     let mut hidden = vec![false; document.root.nodes.len()];
-    for &i in &order {
+    for &i in order {
         hidden[i] = is_hidden(i) || parents[i].is_some_and(|parent| hidden[parent]);
     }
-    let all = order.len();
-    order.retain(|&i| !hidden[i]);
-    if order.len() < all {
-        let what = format!("leaves out {} nodes that are not visible", all - order.len());
-        sink.decide(document.file, what);
+    let count = hidden.iter().filter(|&&hidden| hidden).count();
+    if count > 0 {
+        sink.decide(document.file, format!("leaves out {count} nodes that are not visible"));
     }
-    order
+    hidden
 }
 
 /// All nodes below the roots, parents before children, in file order.

@@ -43,8 +43,10 @@ pub(super) fn for_each<E>(
         rest = &rest[end..];
         rest = rest.strip_prefix("\r\n").unwrap_or_else(|| rest.get(1..).unwrap_or_default());
         line = line.saturating_add(1);
-        if let Some(part) = here.strip_suffix('\\')
-            && !rest.is_empty()
+        // A comment that ends in a path is no beginning of anything.
+        let is_comment = joined.is_none() && here.trim_start().starts_with('#');
+        if let Some(part) = here.trim_end().strip_suffix('\\')
+            && !is_comment
         {
             let (_, whole) = joined.get_or_insert_with(|| (line, String::new()));
             whole.push_str(part);
@@ -56,7 +58,21 @@ pub(super) fn for_each<E>(
             one(line, here, &mut visit)?;
         }
     }
-    Ok(())
+    match joined {
+        Some((first, whole)) => one(first, &whole, &mut visit),
+        None => Ok(()),
+    }
+}
+
+/// What stands before a comment.
+pub(super) fn before_comment(text: &str) -> &str {
+    let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with(|c: char| c.is_ascii_whitespace());
+    text.match_indices('#').find(is_comment).map_or(text, |(at, _)| text[..at].trim_end())
+}
+
+/// A name without the quotes that some exporters put around it.
+pub(super) fn unquoted(name: &str) -> &str {
+    name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name)
 }
 
 fn one<E>(line: u32, text: &str, visit: &mut impl FnMut(Statement<'_>) -> Result<(), E>) -> Result<(), E> {
@@ -75,12 +91,12 @@ mod tests {
     #[test]
     fn all_line_ends_and_continuations_are_understood() {
         let mut seen = Vec::new();
-        let text = "# a\r\nv 1 2\\\n 3\rf  1 2\n\n\tusemtl  red paint \n";
+        let text = "# a \\\r\nv 1 2\\ \n 3\rf  1 2\n\n\tusemtl  red paint \nf 1 2\\";
         let done: Result<(), ()> = for_each(text, |s| {
             seen.push(format!("{}:{}={}", s.line, s.keyword, s.rest));
             Ok(())
         });
         assert_eq!(done, Ok(()));
-        assert_eq!(seen, ["2:v=1 2  3", "4:f=1 2", "6:usemtl=red paint"]);
+        assert_eq!(seen, ["2:v=1 2  3", "4:f=1 2", "6:usemtl=red paint", "7:f=1 2"]);
     }
 }

@@ -1,5 +1,6 @@
 //! `map_` statements of MTL libraries: options, pictures, textures.
 
+use super::lines::{before_comment, unquoted};
 use super::relief;
 use crate::load::error::ReadError;
 use crate::load::picture::{self, Picture};
@@ -20,12 +21,23 @@ struct Map<'a> {
     clamp: bool,
     /// `-bm`.
     bump: f32,
+    /// `-imfchan`: the channel that counts, of those that are one number.
+    channel: Option<char>,
+    /// `-mm`: what is added to the picture's values, and what they are multiplied by before.
+    range: Vec2,
 }
 
 impl<'a> Map<'a> {
     fn parse(statement: &'a str) -> Self {
-        let mut map =
-            Self { name: statement.trim(), scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false, bump: 1.0 };
+        let mut map = Self {
+            name: statement.trim(),
+            scale: Vec2::ONE,
+            offset: Vec2::ZERO,
+            clamp: false,
+            bump: 1.0,
+            channel: None,
+            range: Vec2::Y,
+        };
         while let Some(option) = map.name.strip_prefix('-').and_then(|_| first_word(map.name)) {
             let arguments = match option {
                 "-mm" => 2,
@@ -51,17 +63,45 @@ impl<'a> Map<'a> {
                 if option == "-bm" {
                     map.bump = value.unwrap_or(1.0);
                 }
+                if option == "-imfchan" {
+                    map.channel = word.chars().next();
+                }
                 map.clamp |= option == "-clamp" && word == "on";
                 rest = rest[word.len()..].trim_start();
             }
             match option {
                 "-s" => map.scale = vector,
                 "-o" => map.offset = vector,
+                "-mm" => map.range = vector,
                 _ => {}
             }
             map.name = rest;
         }
+        map.name = unquoted(map.name);
         map
+    }
+
+    /// What the options make of a picture.
+    fn of(&self, picture: &Arc<Texels>) -> Arc<Texels> {
+        if self.channel.is_none() && self.range == Vec2::Y {
+            return Arc::clone(picture);
+        }
+        let moved = |byte: u8| (f32::from(byte) * self.range.y + self.range.x * 255.0).round() as u8;
+        let texel = |&[r, g, b, a]: &[u8; 4]| {
+            let [r, g, b] = [r, g, b].map(moved);
+            match self.channel {
+                Some('r') => [r, r, r, 255],
+                Some('g') => [g, g, g, 255],
+                Some('b') => [b, b, b, 255],
+                Some('m') => [a, a, a, 255],
+                Some('l') => {
+                    let grey = (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)) as u8;
+                    [grey, grey, grey, 255]
+                }
+                _ => [r, g, b, a],
+            }
+        };
+        Arc::new(Texels { texels: picture.texels.iter().map(texel).collect(), ..**picture })
     }
 
     /// In coordinates with v down: the mesh's are turned already.
@@ -107,8 +147,14 @@ pub(super) fn beside(library: &str, statement: &str) -> String {
     format!("{options}{folder}{BESIDE}{name}")
 }
 
-/// Looks for a picture in the folder of its library, then in the scene's.
+/// Looks for a picture; where there is none of that name, `#` may begin a comment.
 fn read(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
+    let bare = unquoted(before_comment(name));
+    read_named(folder, name).or_else(|why| if bare == name { Err(why) } else { read_named(folder, bare) })
+}
+
+/// In the folder of its library, then in the scene's.
+fn read_named(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
     let Some((library, own)) = name.split_once(BESIDE) else {
         return folder.read_or_neighbour(name, IMAGE_LIMIT);
     };
@@ -128,7 +174,7 @@ pub(super) struct Textures {
     spawned: BTreeMap<Key, Entity>,
 }
 
-/// What a texture is made of: for what, of which pictures, and whether it is clamped.
+/// What a texture is made of: for what, by which statements, and whether it is clamped.
 type Key = (&'static str, String, String, bool);
 
 impl Textures {
@@ -193,10 +239,14 @@ impl Textures {
             None => (statement(material, "map_Bump")?, false),
         };
         let map = Map::parse(statement);
-        let texels = Arc::clone(self.images.get(map.name)?);
+        // What stands in for a picture that is not there has no slopes.
+        if self.missing.contains(map.name) {
+            return None;
+        }
+        let texels = map.of(self.images.get(map.name)?);
         let is_normal_map = is_normal_map || relief::is_normal_map(&texels);
         let kind = if is_normal_map { "normals" } else { "heights" };
-        let key = (kind, map.name.to_owned(), map.bump.to_string(), map.clamp);
+        let key = (kind, statement.to_owned(), String::new(), map.clamp);
         let texels = if is_normal_map {
             texels
         } else {
@@ -216,11 +266,15 @@ impl Textures {
         sink: &mut Sink<'_>,
         join: impl Fn(Option<&Texels>, Option<&Texels>) -> Texels,
     ) -> Option<TextureUse> {
-        let maps = keywords.map(|keyword| statement(material, keyword).map(Map::parse));
+        let statements = keywords.map(|keyword| statement(material, keyword));
+        let maps = statements.map(|statement| statement.map(Map::parse));
         let main = maps[0].as_ref().or(maps[1].as_ref())?.clone();
-        let [first, second] =
-            maps.each_ref().map(|map| map.as_ref().and_then(|map| self.images.get(map.name)).map(Arc::clone));
-        let [a, b] = maps.each_ref().map(|map| map.as_ref().map_or(String::new(), |map| map.name.to_owned()));
+        let picture = |map: &Option<Map<'_>>| {
+            let map = map.as_ref()?;
+            self.images.get(map.name).map(|picture| map.of(picture))
+        };
+        let [first, second] = maps.each_ref().map(picture);
+        let [a, b] = statements.map(|statement| statement.unwrap_or_default().to_owned());
         let texels = match (first, second) {
             (None, None) => return None,
             (Some(only), None) if encoding == Encoding::Srgb => only,
@@ -285,10 +339,17 @@ mod tests {
                 scale: Vec2::new(2., 3.),
                 offset: Vec2::new(0.5, 0.),
                 clamp: true,
-                bump: 1.0
+                bump: 1.0,
+                channel: None,
+                range: Vec2::Y,
             }
         );
         assert_eq!(Map::parse("-odd name.png").name, "-odd name.png");
+        let map = Map::parse("-imfchan g -mm 0.5 0.25 \"a.png\"");
+        assert_eq!((map.name, map.channel, map.range), ("a.png", Some('g'), Vec2::new(0.5, 0.25)));
+        let picture = Arc::new(Texels { width: 1, height: 1, texels: vec![[0, 100, 200, 9]] });
+        assert_eq!(map.of(&picture).texels, [[153, 153, 153, 255]]);
+        assert_eq!(Map::parse("a.png").of(&picture).texels, picture.texels);
     }
 
     #[test]

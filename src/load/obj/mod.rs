@@ -26,9 +26,10 @@ use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
 use super::tangents;
-use crate::scene::{Instance, Material, Mesh};
+use crate::scene::{Instance, Material, Mesh, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
+use glam::{DAffine3, DVec3};
 use raw::Raw;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -67,6 +68,11 @@ pub(super) fn load(
     tangents::complete_for(&mut done.mesh, &materials, file, "", sink);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
+    if raw.origin != DVec3::ZERO
+        && let Some(mut transform) = sink.world.get_mut::<Transform>(root)
+    {
+        transform.0 *= DAffine3::from_translation(raw.origin);
+    }
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
         sink.world.entity_mut(root).insert(Instance { mesh, materials });
@@ -89,7 +95,8 @@ fn material_entity(
         sink.decide(file, "surfaces without a material are light grey");
         return sink.spawn((Name::new("default"), Material::default()));
     };
-    if let Some(&known) = library.get(name) {
+    // Names may have `#` in them; where none is defined so, it begins a comment.
+    if let Some(&known) = library.get(name).or_else(|| library.get(lines::before_comment(name))) {
         return known;
     }
     if let Some(replacement) = overrides.replacement(name) {

@@ -1,8 +1,8 @@
 //! MTL libraries → material entities. `tobj` parses what [`tidy`] lets through.
 
-use super::lines::{self, Statement};
+use super::lines::{self, Statement, before_comment, unquoted};
 use super::map::{self, Textures};
-use crate::load::report::Sink;
+use crate::load::report::{Kind, Sink};
 use crate::load::settings::Materials;
 use crate::load::source::{Folder, TEXT_LIMIT};
 use crate::scene::{Alpha, Anisotropy, Clearcoat, Glass, Glossy, Layers, Material, Sheen};
@@ -66,6 +66,7 @@ const MOST_WORDS: usize = 8;
 /// The names in one `mtllib` statement: several, with spaces in them (`\ ` in some programs), or both. Where words could be
 /// one name or several, the longest is meant that is there, else one up to its `.mtl`.
 fn libraries_of<'a>(folder: &'a Folder, statement: &str) -> impl Iterator<Item = String> + use<'a> {
+    let statement = if folder.has(statement) { statement } else { unquoted(before_comment(statement)) };
     let marked = statement.replace("\\ ", "\0");
     let words: Vec<String> = marked.split_ascii_whitespace().map(|word| word.replace('\0', " ")).collect();
     let mut whole = Some(statement.to_owned()).filter(|whole| words.len() > 1 && folder.has(whole));
@@ -102,11 +103,15 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
     }
 }
 
+/// Statements of a colour.
+const COLORS: [&str; 5] = ["Ka", "Kd", "Ks", "Ke", "Tf"];
 /// Statements of one number.
 const SCALARS: [&str; 11] = ["Ns", "Ni", "d", "Tr", "Pr", "Pm", "Ps", "Pc", "Pcr", "aniso", "anisor"];
 /// Statements that name a picture.
 const MAPS: [&str; 9] =
     ["map_Kd", "map_d", "map_Ke", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Bump", "norm"];
+/// The others that are known.
+const OTHERS: [&str; 7] = ["newmtl", "illum", "bump", "map_Ka", "disp", "decal", "refl"];
 
 /// Only statements that `tobj` parses, in its spelling; warns of the others.
 fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
@@ -117,26 +122,29 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
             sink.ignored(library, &format!("line {line}"), format!("`{keyword}` {what}"));
             Ok(())
         };
+        let mut known = COLORS.iter().chain(&SCALARS).chain(&MAPS).chain(&OTHERS);
+        let keyword = known.find(|known| known.eq_ignore_ascii_case(keyword)).copied().unwrap_or(keyword);
         if keyword == "newmtl" {
+            let rest = unquoted(rest);
             inside = !rest.is_empty();
             return if inside { writeln!(tidied, "newmtl {rest}") } else { ignore("without a name") };
         }
         if !inside {
             return ignore("before the first newmtl, ignored");
         }
-        let values: Option<Vec<f32>> = rest
+        let values: Option<Vec<f32>> = before_comment(rest)
             .split_ascii_whitespace()
             .map(|word| word.parse().ok().filter(|v: &f32| v.is_finite()))
             .collect();
-        let keyword = if matches!(keyword, "bump" | "map_bump") { "map_Bump" } else { keyword };
+        let keyword = if keyword == "bump" { "map_Bump" } else { keyword };
         match (keyword, values.as_deref()) {
-            ("Ka" | "Kd" | "Ks" | "Ke" | "Tf", Some([r, g, b, ..])) => {
-                writeln!(tidied, "{keyword} {r} {g} {b}")
+            (color, Some([r, g, b, ..])) if COLORS.contains(&color) => {
+                writeln!(tidied, "{color} {r} {g} {b}")
             }
-            ("Ka" | "Kd" | "Ks" | "Ke" | "Tf", Some([grey])) => {
-                writeln!(tidied, "{keyword} {grey} {grey} {grey}")
+            (color, Some([grey])) if COLORS.contains(&color) => {
+                writeln!(tidied, "{color} {grey} {grey} {grey}")
             }
-            ("Ka" | "Kd" | "Ks" | "Ke" | "Tf", _) => ignore("without three numbers, ignored"),
+            (color, _) if COLORS.contains(&color) => ignore("without three numbers, ignored"),
             ("d", _) if rest.starts_with("-halo") => ignore("-halo is not supported, ignored"),
             (scalar, Some([value, ..])) if SCALARS.contains(&scalar) => writeln!(tidied, "{scalar} {value}"),
             (scalar, _) if SCALARS.contains(&scalar) => ignore("without a number, ignored"),
@@ -205,13 +213,15 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         });
     let opacity = within(opacity.unwrap_or(1.0), 0.0, 1.0);
     let mut fraction = |keyword: &str| scalar(material, keyword).map(|value| within(value, 0.0, 1.0));
-    let pbr = match (fraction("Pr"), fraction("Pm")) {
-        (None, None) if !is_mapped("map_Pr") && !is_mapped("map_Pm") => None,
-        (rough, metal) => Some((
-            rough.unwrap_or(if is_mapped("map_Pr") { 1.0 } else { 0.5 }),
-            metal.unwrap_or(if is_mapped("map_Pm") { 1.0 } else { 0.0 }),
-        )),
+    let is_pbr =
+        ["Pr", "Pm", "Ps", "Pc", "aniso", "map_Pr", "map_Pm"].iter().any(|keyword| is_mapped(keyword));
+    // A picture of what is 0 would not be seen.
+    let mut factor = |keyword: &str, map: &str, unsaid: f32| match fraction(keyword) {
+        Some(value) if value > 0.0 || !is_mapped(map) => value,
+        _ if is_mapped(map) => 1.0,
+        _ => unsaid,
     };
+    let pbr = is_pbr.then(|| (factor("Pr", "map_Pr", 0.5), factor("Pm", "map_Pm", 0.0)));
     let mut layers = Layers {
         ior: material.optical_density.filter(|&ior| ior >= 1.0).unwrap_or(1.5),
         ..Layers::default()
@@ -239,7 +249,16 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         sink.repaired(file, &format!("material `{name}`"), "a value is out of range, clamped");
     }
     let model = material.illumination_model.unwrap_or(2);
-    let is_glass = matches!(model, 4 | 6 | 7 | 9);
+    let passes = matches!(model, 4 | 6 | 7 | 9);
+    // Some exporters write these models for all materials, others for what is half-transparent.
+    let is_bent = material.optical_density.is_some_and(|ior| ior > 1.0) && opacity == 1.0;
+    let is_tinted = tint != Vec3::ONE && tint != Vec3::ZERO;
+    let is_black = diffuse == Vec3::ZERO && !has_texture;
+    let is_glass = passes && (is_bent || is_tinted || is_black);
+    if passes && !is_glass {
+        let what = format!("illum {model} without Ni above 1, Tf or black Kd: no glass, but its Kd");
+        sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);
+    }
     if has_texture && !is_glass && diffuse == Vec3::ZERO {
         // So some exporters say that the picture alone counts; a product with it nobody means.
         let what = "Kd is black, and map_Kd would not be seen: as if it were white";
@@ -279,7 +298,9 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         emission_texture: if emission == Vec3::ZERO { None } else { textures.emission(material, sink) },
         alpha: if transparent && !is_glass { Alpha::Blend } else { Alpha::Opaque },
         opacity: if is_glass { 1.0 } else { opacity },
-        double_sided: false,
+        // The format knows no sides.
+        double_sided: true,
+        culled: false,
         unlit: false,
     }
 }

@@ -1,13 +1,17 @@
 //! An OBJ file as it is written: lists, faces, and the line each face stands on.
 
-use super::lines::Statement;
+use super::lines::{Statement, unquoted};
 use crate::load::error::LoadError;
 use crate::load::report::{Kind, Sink};
-use glam::{Vec2, Vec3};
+use crate::scene::color::linear_from_srgb;
+use glam::{DVec3, Vec2, Vec3};
 use std::collections::{BTreeMap, HashMap};
 
 /// Stands for "no index given".
 pub(super) const NONE: u32 = u32::MAX;
+/// Where the first vertex is so far off, coordinates are read as differences to it: single precision would dent what they
+/// say. Farther off nothing is meant.
+const FAR: std::ops::Range<f64> = 4096.0..1e15;
 /// Different statements that are left out and named.
 const MOST_SKIPPED: usize = 24;
 
@@ -43,7 +47,10 @@ enum Skipped {
 /// An OBJ file as it is written.
 #[derive(Default)]
 pub(super) struct Raw {
+    /// Counted from `origin`.
     pub(super) positions: Vec<Vec3>,
+    /// Where the file's zero is not near enough for single precision, a place among its vertices.
+    pub(super) origin: DVec3,
     /// Empty, or as long as `positions`.
     pub(super) colors: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
@@ -73,17 +80,17 @@ impl Raw {
                 if count == 0 {
                     return Err(broken("texture coordinate without numbers".to_owned()));
                 }
-                self.uvs.push(Vec2::new(u, 1.0 - v));
+                self.uvs.push(Vec2::new(u as f32, 1.0 - v as f32));
             }
             "vn" => match numbers::<3>(statement.rest).map_err(broken)? {
-                (normal, 3) => self.normals.push(Vec3::from(normal)),
+                (normal, 3) => self.normals.push(DVec3::from(normal).as_vec3()),
                 (_, count) => {
                     return Err(broken(format!("normal of {count} numbers instead of 3")));
                 }
             },
             "f" | "fo" => self.read_face(statement).map_err(broken)?,
             "usemtl" => {
-                self.material = Some(statement.rest.to_owned());
+                self.material = Some(unquoted(statement.rest).to_owned());
                 self.slot = None;
             }
             "mtllib" => self.libraries.push(statement.rest.to_owned()),
@@ -105,9 +112,14 @@ impl Raw {
         if count < 3 {
             return Err(format!("vertex of {count} coordinates instead of 3"));
         }
-        self.positions.push(Vec3::new(values[0], values[1], values[2]));
+        let position = DVec3::new(values[0], values[1], values[2]);
+        if self.positions.is_empty() && FAR.contains(&position.abs().max_element()) {
+            self.origin = position.round();
+        }
+        self.positions.push((position - self.origin).as_vec3());
         // Six numbers end in a colour; seven have a weight before it.
-        let color = if count >= 6 { Some(Vec3::from_slice(&values[count - 3..count])) } else { None };
+        let color =
+            if count >= 6 { Some(DVec3::from_slice(&values[count - 3..count]).as_vec3()) } else { None };
         if color.is_some() && self.colors.is_empty() {
             self.colors.resize(self.positions.len() - 1, Vec3::ONE);
         }
@@ -159,12 +171,18 @@ impl Raw {
         Ok(slot)
     }
 
-    /// Some exporters write colours as bytes.
+    /// Brings colours to linear ones from 0 to 1: other programs write them as they are shown, some as bytes.
     pub(super) fn scale_colors(&mut self, file: &str, sink: &mut Sink<'_>) {
         let most = self.colors.iter().filter(|c| c.is_finite()).map(|c| c.max_element()).fold(0.0, f32::max);
         if most > 2.0 && most <= 255.0 {
             self.colors.iter_mut().for_each(|color| *color /= 255.0);
             sink.decide(file, "vertex colours go beyond 1: read as 0 to 255");
+        }
+        if !self.colors.is_empty() {
+            sink.decide(file, "vertex colours are taken for sRGB");
+        }
+        for color in &mut self.colors {
+            *color = color.map(|c| if (0.0..=1.0).contains(&c) { linear_from_srgb(c) } else { c });
         }
     }
 
@@ -258,7 +276,7 @@ impl Raw {
 }
 
 /// Up to `N` numbers; how many there were. Values that are not finite are allowed, here.
-fn numbers<const N: usize>(text: &str) -> Result<([f32; N], usize), String> {
+fn numbers<const N: usize>(text: &str) -> Result<([f64; N], usize), String> {
     let mut values = [0.0; N];
     let mut count = 0;
     for word in text.split_ascii_whitespace().take_while(|word| !word.starts_with('#')).take(N) {
@@ -270,17 +288,17 @@ fn numbers<const N: usize>(text: &str) -> Result<([f32; N], usize), String> {
 
 /// A number. What is spelled as not finite (`nan`, `inf`, `1.#IND` of old compilers) is NaN; what is
 /// too large is infinite.
-fn number(word: &str) -> Option<f32> {
+fn number(word: &str) -> Option<f64> {
     let old = word.contains(".#IN") || word.contains(".#QNAN") || word.contains(".#SNAN");
     if old {
-        return Some(f32::NAN);
+        return Some(f64::NAN);
     }
     let lower = || word.trim_start_matches(['+', '-']).to_ascii_lowercase();
     let Ok(value) = word.parse::<f64>() else {
-        return (lower().starts_with("nan") || lower().starts_with("inf")).then_some(f32::NAN);
+        return (lower().starts_with("nan") || lower().starts_with("inf")).then_some(f64::NAN);
     };
     let is_spelled = !value.is_finite() && !word.contains(|c: char| c.is_ascii_digit());
-    Some(if is_spelled { f32::NAN } else { value as f32 })
+    Some(if is_spelled { f64::NAN } else { value })
 }
 
 /// Index from 0 of what a face names from 1, or from the end if negative.

@@ -168,6 +168,7 @@ fn convert(table: &MaterialTable, check: &mut Check) -> Material {
         alpha: if opacity < 1.0 { Alpha::Blend } else { Alpha::Opaque },
         opacity,
         double_sided: table.double_sided.unwrap_or(false),
+        culled: false,
         unlit: false,
     }
 }

@@ -1,0 +1,118 @@
+//! What other programs write into OBJ and MTL files without anybody having said so.
+
+use super::*;
+
+/// The material `m` of a library that defines it with these statements, beside a picture.
+fn material(statements: &str) -> (World, Material, LoadReport) {
+    let obj = format!("mtllib a.mtl\n{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n");
+    let library = format!("newmtl m\n{statements}\n");
+    let red = png([200, 100, 50, 255]);
+    let files: [(&str, &[u8]); 3] =
+        [("a.obj", obj.as_bytes()), ("a.mtl", library.as_bytes()), ("red.png", &red)];
+    let (mut world, report) = loaded_all(&files);
+    let material = named(&mut world, "m");
+    (world, material, report)
+}
+
+#[test]
+fn models_of_glass_are_glass_only_where_light_can_pass() {
+    let is_glass = |statements: &str| material(statements).1.glass.is_some();
+    for glass in [
+        "Kd 0 0 0\nillum 4",
+        "Kd 1 1 1\nNi 1.5\nillum 7",
+        "Kd 0.5 0.5 0.5\nTf 0.9 1 0.9\nillum 6",
+        "Kd 1 1 1\nNi 1.5\nd 1\nillum 9",
+    ] {
+        assert!(is_glass(glass), "{glass}");
+    }
+    // Maya's of everything, and Blender's of what is half-transparent.
+    let (_, opaque, report) = material("Kd 1 0 0\nTf 1 1 1\nNi 1.0\nillum 4");
+    assert_eq!((opaque.glass, opaque.base_color, opaque.alpha), (None, Vec3::X, Alpha::Opaque));
+    assert_says(&report.decisions().join("\n"), "no glass");
+    let (_, half, _) = material("Kd 1 0 0\nNi 1.45\nd 0.5\nillum 9");
+    assert_eq!((half.glass, half.base_color, half.alpha, half.opacity), (None, Vec3::X, Alpha::Blend, 0.5));
+    assert!(!is_glass("Kd 0 0 0\nmap_Kd red.png\nillum 4"));
+}
+
+#[test]
+fn comments_quotes_and_other_letter_case_change_nothing() {
+    let (world, m, report) =
+        material("kD 1 0.5 0.25 # orange\nNs 20 # dull\nKs 0 0 0\nMAP_KD \"red.png\" # the skin");
+    assert_eq!(report.warnings(), [""; 0]);
+    assert_eq!(m.base_color, Vec3::new(1.0, 0.5, 0.25));
+    let texture = world.get::<Texture>(m.base_color_texture.unwrap().texture).unwrap();
+    assert_eq!(texture.texels.texels, [[200, 100, 50, 255]]);
+    // A name may have one in it.
+    let obj =
+        format!("mtllib \"a b.mtl\" # theirs\n{QUAD}usemtl paint #2\nf 1 2 3\nusemtl m # mine\nf 1 3 4\n");
+    let library = b"newmtl paint #2\nKd 0 1 0\nnewmtl \"m\"\nKd 0 0 1\n";
+    let (mut world, report) = loaded_all(&[("a.obj", obj.as_bytes()), ("a b.mtl", library)]);
+    assert_eq!(report.warnings(), [""; 0]);
+    assert_eq!(named::<Material>(&mut world, "paint #2").base_color, Vec3::Y);
+    let instance = world.query::<&Instance>().single(&world).unwrap().clone();
+    assert_eq!(world.get::<Material>(instance.materials[1]).unwrap().base_color, Vec3::Z);
+}
+
+#[test]
+fn one_channel_of_a_picture_may_be_meant_and_its_values_moved() {
+    let texel = |statements: &str| {
+        let (world, m, _) = material(statements);
+        world.get::<Texture>(m.base_color_texture.unwrap().texture).unwrap().texels.texels[0]
+    };
+    assert_eq!(texel("map_Kd red.png\nmap_d -imfchan g red.png"), [200, 100, 50, 100]);
+    assert_eq!(texel("map_Kd -mm 0 0.5 red.png"), [100, 50, 25, 255]);
+}
+
+#[test]
+fn a_lamp_of_a_library_shines_from_both_sides() {
+    assert!(material("Ke 1 1 1").1.double_sided);
+}
+
+#[test]
+fn factors_of_zero_do_not_hide_pictures_and_a_coat_is_enough() {
+    let (_, m, _) = material("Pr 0\nPm 0\nmap_Pr red.png\nmap_Pm red.png");
+    assert!(matches!(m.glossy, Glossy::Ggx { metallic: 1.0, roughness: 1.0, .. }), "{:?}", m.glossy);
+    assert!(material("Pc 1").1.layers.unwrap().clearcoat.is_some());
+}
+
+#[test]
+fn a_bump_map_that_is_not_there_leaves_the_surface_flat() {
+    let (_, m, report) = material("map_Bump none.png");
+    assert!(m.normal_map.is_none());
+    assert_says(&report.warnings().join("\n"), "none.png");
+}
+
+#[test]
+fn targa_pictures_are_read() {
+    // 1×1, 24 bits, blue first.
+    let targa = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 50, 100, 200];
+    let obj = format!("mtllib a.mtl\n{QUAD}usemtl m\nf 1 2 3\n");
+    let files: [(&str, &[u8]); 3] =
+        [("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl m\nmap_Kd a.tga\n"), ("a.tga", &targa)];
+    let (mut world, report) = loaded_all(&files);
+    assert_eq!(report.warnings(), [""; 0]);
+    assert_eq!(world.query::<&Texture>().single(&world).unwrap().texels.texels, [[200, 100, 50, 255]]);
+    // What only looks a little like one is named.
+    let (_, report) = loaded_all(&[files[0], files[1], ("a.tga", &targa[..12])]);
+    assert_says(&report.warnings().join("\n"), "not recognised");
+}
+
+#[test]
+fn places_far_from_zero_keep_their_shape() {
+    let obj = "v 500000.25 100.5 5432109.125\nv 500000.5 100.5 5432109.125\nv 500000.25 100.75 5432109.25\nf 1 2 3\n";
+    let (mut world, _) = loaded("a.obj", obj);
+    let mesh = only_mesh(&mut world);
+    assert_eq!(mesh.positions[1] - mesh.positions[0], Vec3::new(0.25, 0.0, 0.0));
+    assert_eq!(mesh.positions[2] - mesh.positions[0], Vec3::new(0.0, 0.25, 0.125));
+    let (_, placed) = world.query::<(&Instance, &GlobalTransform)>().single(&world).unwrap();
+    let corner = placed.0.transform_point3(mesh.positions[0].as_dvec3());
+    assert_eq!(corner, DVec3::new(500_000.25, 100.5, 5_432_109.125));
+}
+
+#[test]
+fn triangles_that_go_round_against_their_normals_are_turned() {
+    let text = format!("{QUAD}vn 0 0 -1\nf 1//1 2//1 3//1\n");
+    let (mut world, report) = loaded("a.obj", &text);
+    assert_eq!(only_mesh(&mut world).triangles, [[0, 2, 1]]);
+    assert_says(&report.warnings().join("\n"), "turned over");
+}
