@@ -94,16 +94,22 @@ impl Folder {
     }
 
     /// As [`Folder::read`]; a path that is absolute, elsewhere or missing is tried once more by its
-    /// bare file name, because exporters write the paths of the machine they ran on.
+    /// bare file name, because exporters write the paths of the machine they ran on: here, then in a folder `textures`
+    /// in or beside this one, as downloads often have it.
     pub(super) fn read_or_neighbour(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
         let first = match self.read(reference, limit) {
             Err(why @ (ReadError::Missing | ReadError::Outside | ReadError::Scheme(_))) => why,
             done => return done,
         };
-        match reference.rsplit(['/', '\\']).next() {
-            Some(bare) if bare != reference => self.read(bare, limit).map_err(|_| first),
-            _ => Err(first),
-        }
+        let bare = reference.rsplit(['/', '\\']).next().unwrap_or(reference);
+        let here = if bare == reference { Err(first) } else { self.read(bare, limit).map_err(|_| first) };
+        let Self::Disk(folder, files) = self else { return here };
+        here.or_else(|first| {
+            let mut beside = [Some(folder.as_path()), folder.parent()].into_iter().flatten();
+            let there =
+                |folder: &Path| Self::Disk(folder.join("textures"), files.clone()).read(bare, limit).ok();
+            beside.find_map(there).ok_or(first)
+        })
     }
 }
 

@@ -98,6 +98,19 @@ fn targa_pictures_are_read() {
 }
 
 #[test]
+fn a_folder_of_textures_beside_the_model_is_looked_into() {
+    let obj = format!("mtllib a.mtl\n{QUAD}usemtl m\nf 1 2 3\n");
+    let mtl = b"newmtl m\nmap_Kd D:\\work\\skin.png\n";
+    for place in ["textures/skin.png", "model/textures/skin.png", "model/skin.png"] {
+        let red = png([200, 100, 50, 255]);
+        let files: [(&str, &[u8]); 3] =
+            [("model/a.obj", obj.as_bytes()), ("model/a.mtl", mtl), (place, &red)];
+        let (_, report) = loaded_all(&files);
+        assert_eq!(report.warnings(), [""; 0], "{place}");
+    }
+}
+
+#[test]
 fn places_far_from_zero_keep_their_shape() {
     let obj = "v 500000.25 100.5 5432109.125\nv 500000.5 100.5 5432109.125\nv 500000.25 100.75 5432109.25\nf 1 2 3\n";
     let (mut world, _) = loaded("a.obj", obj);

@@ -196,6 +196,10 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let has_texture = material.diffuse_texture.is_some();
     let mut diffuse =
         unit(material.diffuse.map_or(Vec3::splat(if has_texture { 1.0 } else { 0.8 }), Vec3::from));
+    if material.specular.is_none() && material.specular_texture.is_some() {
+        let what = "map_Ks without Ks, which says how much: left out";
+        sink.ignored(file, &format!("material `{name}`"), what);
+    }
     let mut specular = unit(material.specular.map_or(Vec3::ZERO, Vec3::from));
     let tint = unit(color(material, "Tf").unwrap_or(Vec3::ONE));
     let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
