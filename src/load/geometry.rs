@@ -153,8 +153,12 @@ pub(super) fn unit_normal(corners: [Vec3; 3]) -> Option<Vec3> {
 }
 
 /// Drops what cannot be traced and mends what can, so that every promise of [`TriangleMesh`] holds.
-/// With `keep_flat`, triangles without area stay.
-pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
+/// With `keep_flat`, triangles without area stay. `two_sided`: the slots whose triangles have no front that counts.
+pub(super) fn finish(
+    mut mesh: TriangleMesh,
+    keep_flat: bool,
+    two_sided: impl Fn(usize) -> bool + Sync,
+) -> Finished {
     let is_near = |p: &Vec3| p.abs().max_element() <= FAR;
     let all_near = mesh.positions.par_iter().with_min_len(MANY).all(|p| p.is_finite() && is_near(p));
     let not_finite =
@@ -164,7 +168,7 @@ pub(super) fn finish(mut mesh: TriangleMesh, keep_flat: bool) -> Finished {
     mended.too_far = if all_near { 0 } else { retain(&mut mesh, |corners| corners.iter().all(is_near)) };
     mended.without_area = if keep_flat { 0 } else { mesh.drop_degenerate() };
     mend_normals(&mut mesh, &mut mended);
-    mended.turned = turn_to_normals(&mut mesh);
+    mended.turned = turn_to_normals(&mut mesh, two_sided);
     for uv in mesh.uvs.iter_mut().chain(&mut mesh.second_uvs) {
         if !uv.is_finite() {
             *uv = Vec2::ZERO;
@@ -201,12 +205,15 @@ fn retain(mesh: &mut TriangleMesh, mut pass: impl FnMut([Vec3; 3]) -> bool) -> u
 
 /// Turns triangles over that none of their normals agrees with, as mirrored exports and some CAD programs leave them: else their
 /// normals would be those of the other side. Returns how many.
-fn turn_to_normals(mesh: &mut TriangleMesh) -> usize {
-    let (positions, normals) = (&mesh.positions, &mesh.normals);
+fn turn_to_normals(mesh: &mut TriangleMesh, two_sided: impl Fn(usize) -> bool + Sync) -> usize {
+    let TriangleMesh { positions, normals, slots, .. } = mesh;
     if normals.is_empty() {
         return 0;
     }
-    let turn = |corners: &mut [u32; 3]| {
+    let turn = |(i, corners): (usize, &mut [u32; 3])| {
+        if !two_sided(slots.get(i).map_or(0, |&slot| usize::from(slot))) {
+            return 0;
+        }
         let [a, b, c] = corners.map(|i| positions[i as usize]);
         let facet = (b - a).cross(c - a);
         let is_against = corners.iter().all(|&i| normals[i as usize].dot(facet) < 0.0);
@@ -215,7 +222,7 @@ fn turn_to_normals(mesh: &mut TriangleMesh) -> usize {
         }
         usize::from(is_against)
     };
-    mesh.triangles.par_iter_mut().with_min_len(MANY).map(turn).sum()
+    mesh.triangles.par_iter_mut().enumerate().with_min_len(MANY).map(turn).sum()
 }
 
 /// Unit length for all; what has no direction gets the mean normal of its faces.
@@ -269,7 +276,7 @@ mod tests {
         flat.positions[2] = flat.positions[1];
         let mut far = triangle(0.0);
         far.positions[0].x = f32::NAN;
-        let done = finish(merge(vec![flat, far, triangle(0.0)]), false);
+        let done = finish(merge(vec![flat, far, triangle(0.0)]), false, |_| true);
         assert_eq!((done.triangles, done.mesh.triangles.len()), (2, 1));
         assert_eq!((done.mended.not_finite, done.mended.without_area), (1, 1));
     }
@@ -278,16 +285,19 @@ mod tests {
     fn zero_normals_become_face_normals() {
         let part =
             Part { normals: Some(vec![Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X * 3.0]), ..triangle(0.0) };
-        let done = finish(merge(vec![part]), false);
+        let done = finish(merge(vec![part]), false, |_| true);
         assert_eq!(done.mesh.normals, [Vec3::Z, Vec3::Z, Vec3::X]);
     }
 
     #[test]
     fn a_triangle_goes_round_as_its_normals_say() {
-        let around = |normals: [Vec3; 3]| {
-            let done = finish(merge(vec![Part { normals: Some(normals.to_vec()), ..triangle(0.0) }]), false);
+        let by = |normals: [Vec3; 3], two_sided: bool| {
+            let mesh = merge(vec![Part { normals: Some(normals.to_vec()), ..triangle(0.0) }]);
+            let done = finish(mesh, false, |_| two_sided);
             (done.mesh.triangles[0], done.mended.turned)
         };
+        let around = |normals| by(normals, true);
+        assert_eq!(by([Vec3::NEG_Z; 3], false), ([0, 1, 2], 0));
         assert_eq!(around([Vec3::Z; 3]), ([0, 1, 2], 0));
         assert_eq!(around([Vec3::NEG_Z; 3]), ([0, 2, 1], 1));
         assert_eq!(around([Vec3::NEG_Z, Vec3::NEG_Z, Vec3::Z]), ([0, 1, 2], 0));

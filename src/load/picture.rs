@@ -11,6 +11,10 @@ use std::borrow::Cow;
 use std::io::Cursor;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
 
 /// Most texels of one picture: 8192 squared, 256 MiB decoded.
 const MOST_TEXELS: u64 = 1 << 26;
@@ -152,14 +156,35 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels,
         let what = "image with high dynamic range: cut at 1 and kept in 8 bits";
         remarks.push(Note(Kind::Approximated, what.to_owned()));
     }
-    let rgba = image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
-    let (width, height) = rgba.dimensions();
-    let (texels, rest) = rgba.as_raw().as_chunks::<4>();
-    if rest.is_empty() && texels.len() as u64 == u64::from(width) * u64::from(height) {
-        Ok(Texels { width, height, texels: texels.to_vec() })
+    let rgba = match jpeg_rgba(bytes).filter(|_| format == ImageFormat::Jpeg) {
+        Some(rgba) => rgba,
+        None => {
+            let rgba =
+                image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
+            rgba.into_raw()
+        }
+    };
+    // No copy: a texel needs no other place than its bytes.
+    let texels = bytemuck::try_cast_vec(rgba).unwrap_or_else(|(_, rgba)| rgba.as_chunks::<4>().0.to_vec());
+    if texels.len() as u64 == u64::from(width) * u64::from(height) {
+        Ok(Texels { width, height, texels })
     } else {
         Err("image has the wrong number of texels".to_owned())
     }
+}
+
+/// The bytes of a JPEG picture of one or three components, as `image` finds them by the same decoder, but without a picture in
+/// three bytes before that in four. `None` if it is another, or not whole.
+fn jpeg_rgba(bytes: &[u8]) -> Option<Vec<u8>> {
+    if !matches!(jpeg_components(bytes), Some(1 | 3)) {
+        return None;
+    }
+    let options = DecoderOptions::default()
+        .set_strict_mode(false)
+        .set_max_width(usize::MAX)
+        .set_max_height(usize::MAX)
+        .jpeg_set_out_colorspace(ColorSpace::RGBA);
+    JpegDecoder::new_with_options(ZCursor::new(bytes), options).decode().ok()
 }
 
 fn describe(error: &ImageError) -> String {
@@ -192,5 +217,30 @@ fn jpeg_components(bytes: &[u8]) -> Option<u8> {
             return bytes.get(at + 9).copied();
         }
         at += 2 + usize::from(u16::from_be_bytes([high, low]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::codecs::jpeg::JpegEncoder;
+    use image::{DynamicImage, ExtendedColorType};
+
+    #[test]
+    fn jpeg_pictures_are_those_that_image_decodes() -> Result<(), String> {
+        let bytes: Vec<u8> = (0..33 * 17 * 3).map(|i: u32| (i * i / 7) as u8).collect();
+        for (color, channels) in [(ExtendedColorType::Rgb8, 3), (ExtendedColorType::L8, 1)] {
+            let mut jpeg = Vec::new();
+            JpegEncoder::new(&mut jpeg)
+                .encode(&bytes[..33 * 17 * channels], 33, 17, color)
+                .map_err(|error| error.to_string())?;
+            assert!(jpeg_rgba(&jpeg).is_some());
+            let ours = decode(&jpeg, true, &mut Vec::new())?;
+            let theirs = image::load_from_memory(&jpeg).map(DynamicImage::into_rgba8);
+            let theirs = theirs.map_err(|error| error.to_string())?;
+            assert_eq!((ours.width, ours.height), theirs.dimensions());
+            assert_eq!(ours.texels.as_flattened(), theirs.as_raw().as_slice());
+        }
+        Ok(())
     }
 }

@@ -9,7 +9,7 @@ use crate::load::error::LoadError;
 use crate::load::geometry::{self, MANY, Part};
 use crate::load::report::Sink;
 use crate::load::tangents;
-use crate::scene::{Deform, Mesh, Skin};
+use crate::scene::{Deform, Material, Mesh, Skin};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{Vec2, Vec3, Vec4};
@@ -89,7 +89,10 @@ impl Meshes {
         let parts = geometry::faceted_beside_smooth(parts);
         let mut bound = follower.map(|follower| (follower, deform::gather(&parts)));
         // What has no area now may have it in another shape.
-        let mut done = geometry::finish(geometry::merge(parts), bound.is_some());
+        let sides = materials.iter().map(|&material| sink.world.get::<Material>(material));
+        let two_sided: Vec<bool> = sides.map(|material| material.is_none_or(|m| !m.culled)).collect();
+        let is_two_sided = |slot: usize| two_sided.get(slot).copied().unwrap_or(true);
+        let mut done = geometry::finish(geometry::merge(parts), bound.is_some(), is_two_sided);
         let unsplit = bound.is_some().then(|| (done.mesh.positions.len(), done.mesh.triangles.clone()));
         tangents::complete_for(&mut done.mesh, &materials, document.file, &label, sink);
         if let (Some((_, bonds)), Some((count, triangles))) = (&mut bound, unsplit) {

@@ -64,7 +64,7 @@ pub(super) fn load(
         .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
         .collect();
     sink.begin(Phase::Meshes);
-    let mut done = geometry::finish(assemble::mesh(&raw), false);
+    let mut done = geometry::finish(assemble::mesh(&raw), false, |_| true);
     tangents::complete_for(&mut done.mesh, &materials, file, "", sink);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
