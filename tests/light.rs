@@ -13,6 +13,7 @@ mod stage;
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use penumbra::scene::{Emission, Light, Material};
+use penumbra::torture::light::oracle;
 use penumbra::trace::Integrator;
 use stage::{Estimate, Exact as _, Frames as _, Stage, quad, reds, settings};
 use std::f64::consts::PI;
@@ -62,6 +63,33 @@ fn a_line_of_falling_strength_sends_its_mean_to_the_middle() {
         s.add(light, DAffine3::from_translation(DVec3::Z * 2.0));
     });
     e.assert_is("line of falling strength", 0.561750554397, 1e-3);
+}
+
+/// By area or by length, nearly all light would come from places that are hardly ever sampled.
+#[test]
+fn lamps_much_larger_than_they_are_far_are_no_gamble() {
+    let plate = irradiance_with(64, DVec3::ZERO, DVec3::Z, |s| {
+        let light = Light::Disk { radius: 100.0, radiance: Vec3::ONE, two_sided: true };
+        s.add(light, DAffine3::from_translation(DVec3::Z));
+    });
+    plate.assert_is("1 under a disk of radius 100", oracle::disk(100.0, 1.0, 0.0), 0.02);
+    let (a, b) = (v(-1.0, 0.0, 0.002), v(1.0, 0.0, 0.002));
+    let wire = irradiance_with(64, DVec3::ZERO, DVec3::Z, |s| {
+        let strength = [Vec3::ONE; 2];
+        let light = Light::Segment { half_length: 1.0, strength, emission: Emission::Isotropic };
+        s.add(light, DAffine3::from_translation((a + b) * 0.5));
+    });
+    let exact = oracle::line(a, b, DVec3::ZERO, DVec3::Z, oracle::Line::Isotropic);
+    wire.assert_is("0.002 under a line", exact, 0.02);
+    // Below the acute corner of one of its triangles.
+    let corner = Vec3::new(-1.0, -1.0, 0.5);
+    let (u, w) = (Vec3::X * 1000.0, Vec3::Y * 1000.0);
+    let known = irradiance_with(1, DVec3::ZERO, DVec3::Z, |s| panel(s, corner.as_dvec3(), u, w));
+    let ceiling = irradiance_with(64, DVec3::ZERO, DVec3::Z, |s| {
+        let lamp = Material { double_sided: true, ..Material::emissive(Vec3::ONE) };
+        s.add_mesh(quad(corner, u, w), lamp, HERE);
+    });
+    ceiling.assert_is("under a corner of a large mesh", known.mean, 0.02);
 }
 
 #[test]

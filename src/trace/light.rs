@@ -131,17 +131,15 @@ impl FlatLight {
                 Some(LightSample::new(wi, None, radiance, Some(cone_pdf(*sin2_radius))))
             }
             Self::Segment { from, to, strength, emission } => {
-                // Uniform by length: density 1 / length; a line has no cosine and no area of its own.
-                let position = from.lerp(*to, u.x);
-                let (wi, distance2) = direction(point, position)?;
-                let along = *to - *from;
-                let length = along.length();
+                let place = place_on_segment(point, [*from, *to], u.x)?;
+                let position = from.lerp(*to, place.along);
+                let (wi, _) = direction(point, position)?;
                 let sine = match emission {
                     Emission::Isotropic => 1.0,
-                    Emission::Sine => along.cross(wi).length() / length,
+                    Emission::Sine => place.sine,
                 };
-                let strength = strength[0].lerp(strength[1], u.x);
-                Some(LightSample::new(wi, Some(position), strength * (sine * length / distance2), None))
+                let strength = strength[0].lerp(strength[1], place.along);
+                Some(LightSample::new(wi, Some(position), strength * (sine * place.weight), None))
             }
             Self::Shape(light) => light.sample(point, normal, u),
             Self::Mesh(light) => light.sample(&Receiver { point, normal }, u),
@@ -186,6 +184,44 @@ impl FlatLight {
         };
         Some(Emitter::all_round(bounds, intensity))
     }
+}
+
+/// A place on a segment, as seen from a point.
+struct SegmentPlace {
+    /// Share of the way from its first end, 0 to 1.
+    along: f32,
+    /// Of the angle between it and the line of sight.
+    sine: f32,
+    /// 1 / (density by length · distance²): a line has no cosine and no area of its own.
+    weight: f32,
+}
+
+/// Evenly by the angle under which the segment is seen from `point`, so that the distance does not matter, however near it is.
+///
+/// Reference: C. Kulla, M. Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media", EGSR 2012, 4.1
+/// (equi-angular sampling).
+fn place_on_segment(point: Vec3, ends: [Vec3; 2], u: f32) -> Option<SegmentPlace> {
+    let [from, to] = ends.map(Vec3::as_dvec3);
+    let axis = to - from;
+    let length = axis.length();
+    let unit = axis / length;
+    let away = from - point.as_dvec3();
+    let first = away.dot(unit);
+    let height = (away - unit * first).length();
+    if height <= 1e-9 * (length + first.abs()) {
+        // In its own line it is seen as a point.
+        let distance = first + f64::from(u) * length;
+        let weight = length / (distance * distance);
+        return weight.is_finite().then_some(SegmentPlace { along: u, sine: 0.0, weight: weight as f32 });
+    }
+    let last = first + length;
+    // Differences of arcs without cancellation, as seen from far away.
+    let whole = (height * length).atan2(height * height + first * last);
+    let turn = (first / height).atan() + f64::from(u) * whole;
+    let place = height * turn.tan();
+    let along = ((place - first) / length).clamp(0.0, 1.0);
+    let sine = height / (height * height + place * place).sqrt();
+    Some(SegmentPlace { along: along as f32, sine: sine as f32, weight: (whole / height) as f32 })
 }
 
 /// The unit direction and the squared distance between two points; `None` if they are one.

@@ -179,11 +179,11 @@ impl MeshLight {
     }
 }
 
-/// Whether a triangle is so near that it is sampled by solid angle, not by area: its middle is nearer than half of its
-/// longest edge.
+/// Whether a triangle is so near that it is sampled by solid angle, not by area: its middle is nearer than its longest edge
+/// is long, so no point of it is near that is not asked so, below acute corners either.
 fn is_near([a, b, c]: &[Vec3; 3], point: Vec3) -> bool {
     let longest = (*b - *a).length_squared().max((*c - *b).length_squared()).max((*a - *c).length_squared());
-    4.0 * ((*a + *b + *c) / 3.0 - point).length_squared() < longest
+    ((*a + *b + *c) / 3.0 - point).length_squared() < longest
 }
 
 fn seen_from(corners: &[Vec3; 3], point: Vec3) -> Option<SphericalTriangle> {

@@ -103,6 +103,16 @@ impl ShapeLight {
                 sample_flat(point, quad.at(&place), self.normal, area, self.two_sided, radiance)
             }
             Shape::Disk { center, normal, radius } => {
+                let square = square_around(*center, *normal, *radius);
+                if square.is_near(point) {
+                    // Evenly by solid angle in the square around it; by area, what is right above would have no end of variance.
+                    let seen = SphericalQuad::new(&square, point)?;
+                    let position = meet(&square.corners().map(Vec3::as_dvec3), point, seen.sample(u)?)?;
+                    let is_in = position.distance_squared(center.as_dvec3()) <= f64::from(*radius).powi(2);
+                    let (place, pdf) = (position.as_vec3(), (1.0 / seen.solid_angle) as f32);
+                    let sample = || sample_at(point, place, *normal, pdf, self.two_sided, self.radiance[0]);
+                    return is_in.then(sample).flatten();
+                }
                 let (tangent, bitangent) = normal.any_orthonormal_pair();
                 let (y, x) = (2.0 * PI * u.y).sin_cos();
                 let position = *center + (tangent * x + bitangent * y) * (radius * u.x.sqrt());
@@ -140,10 +150,14 @@ impl ShapeLight {
                 let sin2 = radius * radius / center.distance_squared(ray.origin);
                 if sin2 < 1.0 { cone_pdf(sin2) } else { 0.25 / PI }
             }
-            Shape::Parallelogram(quad) if quad.is_near(ray.origin) => {
-                SphericalQuad::new(quad, ray.origin).map_or(0.0, |seen| (1.0 / seen.solid_angle) as f32)
-            }
+            Shape::Parallelogram(quad) if quad.is_near(ray.origin) => pdf_near(quad, ray.origin),
             shape => {
+                if let Shape::Disk { center, normal, radius } = shape {
+                    let square = square_around(*center, *normal, *radius);
+                    if square.is_near(ray.origin) {
+                        return pdf_near(&square, ray.origin);
+                    }
+                }
                 let density = match shape {
                     Shape::Parallelogram(quad) => {
                         quad.brightness(ray.origin, normal).density(hit.uv.x, hit.uv.y)
@@ -221,6 +235,16 @@ impl ShapeLight {
         let [a, b, c, d] = self.radiance;
         a.lerp(b, uv.x).lerp(c.lerp(d, uv.x), uv.y)
     }
+}
+
+fn pdf_near(quad: &Quad, point: Vec3) -> f32 {
+    SphericalQuad::new(quad, point).map_or(0.0, |seen| (1.0 / seen.solid_angle) as f32)
+}
+
+/// The square that a disk touches from within.
+fn square_around(center: Vec3, normal: Vec3, radius: f32) -> Quad {
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    Quad::new(center - (tangent + bitangent) * radius, tangent * (2.0 * radius), bitangent * (2.0 * radius))
 }
 
 /// Where a ray meets a light's shape.
