@@ -52,7 +52,7 @@ pub fn read_arguments(path: &Path) -> Result<Vec<String>, ImageError> {
     let limits = png::Limits { bytes: 64 << 20 };
     let mut reader = png::Decoder::new_with_limits(BufReader::new(file), limits)
         .read_info()
-        .map_err(|error| invalid(error.to_string()))?;
+        .map_err(|error| invalid(format!("{error} Give a screenshot of the window, a PNG")))?;
     let mut found = None;
     for finished in [false, true] {
         if finished {
@@ -66,7 +66,7 @@ pub fn read_arguments(path: &Path) -> Result<Vec<String>, ImageError> {
             chunks.iter().find(|chunk| chunk.keyword == ARGUMENTS).and_then(|chunk| chunk.get_text().ok());
     }
     let text =
-        found.ok_or_else(|| invalid("no picture of this program: it doesn't say how it was made".into()))?;
+        found.ok_or_else(|| invalid("doesn't say how it was made: only screenshots of the window (F12) do".into()))?;
     serde_json::from_str(&text).map_err(|error| invalid(format!("its recipe is damaged: {error}")))
 }
 
