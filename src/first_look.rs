@@ -65,7 +65,7 @@ fn is_mostly_dark(app: &App, picture: &Film) -> bool {
     for y in 0..size.y {
         for (x, pixel) in (0..size.x).zip(picture.row(y)) {
             let ray = scene.viewpoint.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size);
-            seen.push(scene.geometry.tlas.closest_hit(&ray).map(|hit| {
+            seen.push(scene.first_seen(&ray).map(|hit| {
                 let (material, shown) =
                     (&scene.surface_at(&hit).1.material, luminance(pixel.mean().as_vec3()));
                 let shines = material.emission != Vec3::ZERO;

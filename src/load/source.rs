@@ -105,10 +105,8 @@ impl Folder {
         let here = if bare == reference { Err(first) } else { self.read(bare, limit).map_err(|_| first) };
         let Self::Disk(folder, files) = self else { return here };
         here.or_else(|first| {
-            let mut beside = [Some(folder.as_path()), folder.parent()].into_iter().flatten();
-            let there =
-                |folder: &Path| Self::Disk(folder.join("textures"), files.clone()).read(bare, limit).ok();
-            beside.find_map(there).ok_or(first)
+            let there = |beside| Self::Disk(folder.join(beside), files.clone()).read(bare, limit).ok();
+            ["textures", "../textures"].into_iter().find_map(there).ok_or(first)
         })
     }
 }

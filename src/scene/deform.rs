@@ -143,7 +143,7 @@ fn carry_tangents(rest: &TriangleMesh, mesh: &mut TriangleMesh) {
             let tangent = rest.tangents[corner as usize].truncate().as_dvec3();
             let (along_u, along_v) = (tangent.dot(u), tangent.dot(v));
             let (a, b) = ((along_u * vv - along_v * uv) / area, (along_v * uu - along_u * uv) / area);
-            carried[corner as usize] += to_u * a + to_v * b;
+            carried[corner as usize] += (to_u * a + to_v * b) * area.sqrt();
         }
     }
     for (tangent, carried) in mesh.tangents.iter_mut().zip(carried) {

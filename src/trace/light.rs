@@ -211,8 +211,8 @@ fn place_on_segment(point: Vec3, ends: [Vec3; 2], u: f32) -> Option<SegmentPlace
     if height <= 1e-9 * (length + first.abs()) {
         // In its own line it is seen as a point.
         let distance = first + f64::from(u) * length;
-        let weight = length / (distance * distance);
-        return weight.is_finite().then_some(SegmentPlace { along: u, sine: 0.0, weight: weight as f32 });
+        let weight = (length / (distance * distance)) as f32;
+        return weight.is_finite().then_some(SegmentPlace { along: u, sine: 0.0, weight });
     }
     let last = first + length;
     // Differences of arcs without cancellation, as seen from far away.

@@ -216,6 +216,14 @@ impl<'a> TraceScene<'a> {
         }
     }
 
+    /// The nearest surface that the eye sees along one ray; what is there by half is there.
+    #[must_use]
+    pub fn first_seen(&self, ray: &Ray) -> Option<Hit> {
+        let mut hit = [None];
+        self.closest_hits(&[*ray], &mut hit, |_| true, |_, _| 0.5);
+        hit[0]
+    }
+
     /// Whether `ray` meets there the back of what is not seen from behind.
     fn is_unseen_back(&self, hit: &Hit, ray: &Ray) -> bool {
         if !self.coverage.culled.get(hit.instance as usize).is_some_and(|&culled| culled) {

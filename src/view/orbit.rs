@@ -6,8 +6,8 @@ use super::input::{Drag, Input};
 use super::keymap::{Hold, Tap};
 use crate::bvh::Ray;
 use crate::scene::{Camera, Lens, Projection, Transform};
-use crate::sync::RenderOrigin;
-use crate::trace::{Geometry, Lights, RenderSettings, Viewpoint};
+use crate::sync::{RenderOrigin, Traceable};
+use crate::trace::{RenderSettings, TraceScene, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, DVec3};
 
@@ -40,11 +40,11 @@ pub fn ray_through(viewpoint: &Viewpoint, settings: &RenderSettings, place: DVec
     viewpoint.ray((place * settings.size.as_dvec2()).as_vec2(), settings.size)
 }
 
-/// Where `ray` first meets something, in its parameter; solid lights too.
+/// Where the eye first sees something along `ray`, in its parameter; solid lights too.
 #[must_use]
-pub fn first_surface(geometry: &Geometry, lights: &Lights, ray: &Ray) -> Option<f32> {
-    let surface = geometry.tlas.closest_hit(ray).map(|hit| hit.t);
-    let lamp = lights.closest(&Ray { t_max: surface.unwrap_or(f32::INFINITY), ..*ray });
+pub fn first_surface(scene: &TraceScene, ray: &Ray) -> Option<f32> {
+    let surface = scene.first_seen(ray).map(|hit| hit.t);
+    let lamp = scene.lights.closest(&Ray { t_max: surface.unwrap_or(f32::INFINITY), ..*ray });
     lamp.map(|found| found.hit.t).or(surface)
 }
 
@@ -65,8 +65,7 @@ pub fn change_navigation(
 #[expect(clippy::too_many_arguments, reason = "what it looks at, and what it sets")]
 pub fn focus(
     input: Res<Input>,
-    geometry: Res<Geometry>,
-    lights: Res<Lights>,
+    scene: Traceable,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
     origin: Res<RenderOrigin>,
@@ -76,7 +75,7 @@ pub fn focus(
 ) {
     for press in input.taps.iter().filter(|press| press.tap == Tap::Focus) {
         let ray = ray_through(&viewpoint, &settings, press.cursor);
-        let Some(t) = first_surface(&geometry, &lights, &ray) else {
+        let Some(t) = first_surface(&scene.scene(), &ray) else {
             notices.0.push(Notice::Text("nothing there to focus on".to_owned()));
             continue;
         };

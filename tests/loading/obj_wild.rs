@@ -43,9 +43,10 @@ fn comments_quotes_and_other_letter_case_change_nothing() {
     let texture = world.get::<Texture>(m.base_color_texture.unwrap().texture).unwrap();
     assert_eq!(texture.texels.texels, [[200, 100, 50, 255]]);
     // A name may have one in it.
-    let obj =
-        format!("mtllib \"a b.mtl\" # theirs\n{QUAD}usemtl paint #2\nf 1 2 3\nusemtl m # mine\nf 1 3 4\n");
-    let library = b"newmtl paint #2\nKd 0 1 0\nnewmtl \"m\"\nKd 0 0 1\n";
+    let obj = format!(
+        "mtllib \"a b.mtl\" # theirs\n{QUAD}usemtl paint #2\nf 1 2 3\nusemtl \"m\" # mine\nf 1 3 4\n"
+    );
+    let library = b"newmtl paint #2\nKd 0 1 0\nnewmtl m # blue\nKd 0 0 1\n";
     let (mut world, report) = loaded_all(&[("a.obj", obj.as_bytes()), ("a b.mtl", library)]);
     assert_eq!(report.warnings(), [""; 0]);
     assert_eq!(named::<Material>(&mut world, "paint #2").base_color, Vec3::Y);
@@ -73,6 +74,8 @@ fn factors_of_zero_do_not_hide_pictures_and_a_coat_is_enough() {
     let (_, m, _) = material("Pr 0\nPm 0\nmap_Pr red.png\nmap_Pm red.png");
     assert!(matches!(m.glossy, Glossy::Ggx { metallic: 1.0, roughness: 1.0, .. }), "{:?}", m.glossy);
     assert!(material("Pc 1").1.layers.unwrap().clearcoat.is_some());
+    let (_, m, _) = material("Ks 1 1 1\nKd 0 0 0\nNs 100\nillum 3\nPc 0\naniso 0");
+    assert_eq!((m.mirror, m.glossy), (Vec3::ONE, Glossy::None));
 }
 
 #[test]
@@ -120,6 +123,22 @@ fn places_far_from_zero_keep_their_shape() {
     let (_, placed) = world.query::<(&Instance, &GlobalTransform)>().single(&world).unwrap();
     let corner = placed.0.transform_point3(mesh.positions[0].as_dvec3());
     assert_eq!(corner, DVec3::new(500_000.25, 100.5, 5_432_109.125));
+}
+
+#[test]
+fn places_near_zero_stay_where_they_are_whatever_else_is_in_the_file() {
+    let near = "v 0.1 0.2 0.3\nv 1.1 0.2 0.3\nv 0.1 1.2 0.3\n";
+    for (far, face) in [
+        ("v 1e10 0 0\n", "f 2 3 4\n"),
+        ("v nan 5000 0\n", "f 2 3 4\n"),
+        ("v 10000 0 0\nv -10000 0 0\nv 0 10000 0\n", "f 1 2 3\nf 4 5 6\n"),
+    ] {
+        let (mut world, _) = loaded("a.obj", &format!("{far}{near}{face}"));
+        let mesh = only_mesh(&mut world);
+        assert!(mesh.positions.contains(&Vec3::new(0.1, 0.2, 0.3)), "{far}: {:?}", mesh.positions);
+        let (_, placed) = world.query::<(&Instance, &GlobalTransform)>().single(&world).unwrap();
+        assert_eq!(placed.0, DAffine3::IDENTITY, "{far}");
+    }
 }
 
 #[test]

@@ -30,7 +30,7 @@ impl Palette {
     pub(super) fn default_material(&mut self, file: &str, sink: &mut Sink<'_>) -> Entity {
         *self.default.get_or_insert_with(|| {
             sink.decide(file, "surfaces without a material are light grey");
-            sink.spawn((Name::new("default"), Material::default()))
+            sink.spawn((Name::new("default"), Material { culled: true, ..Material::default() }))
         })
     }
 }

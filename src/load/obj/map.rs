@@ -6,10 +6,11 @@ use crate::load::error::ReadError;
 use crate::load::picture::{self, Picture};
 use crate::load::report::Sink;
 use crate::load::source::{Bytes, Folder, IMAGE_LIMIT};
+use crate::scene::color::luminance;
 use crate::scene::{Encoding, Filter, NormalMap, Texels, Texture, TextureUse, Wrap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use glam::{Affine2, Vec2};
+use glam::{Affine2, Vec2, Vec3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 /// A texture statement: options, then a file name that may have spaces.
@@ -51,12 +52,14 @@ impl<'a> Map<'a> {
                 "-s" => Vec2::ONE,
                 _ => Vec2::ZERO,
             };
+            let mut all_numbers = true;
             for i in 0..arguments {
                 let Some(word) = first_word(rest) else { break };
                 let value = word.parse::<f32>().ok().filter(|value| value.is_finite());
                 if arguments == 3 && value.is_none() {
                     break;
                 }
+                all_numbers &= value.is_some();
                 if i < 2 {
                     vector[i] = value.unwrap_or(0.0);
                 }
@@ -72,18 +75,29 @@ impl<'a> Map<'a> {
             match option {
                 "-s" => map.scale = vector,
                 "-o" => map.offset = vector,
-                "-mm" => map.range = vector,
+                "-mm" if all_numbers => map.range = vector,
                 _ => {}
             }
             map.name = rest;
         }
-        map.name = unquoted(map.name);
         map
+    }
+
+    /// What it takes of its picture.
+    fn source(&self) -> String {
+        if self.is_plain() {
+            return self.name.to_owned();
+        }
+        format!("{:?} {} {}", self.channel, self.range, self.name)
+    }
+
+    fn is_plain(&self) -> bool {
+        self.channel.is_none() && self.range == Vec2::Y
     }
 
     /// What the options make of a picture.
     fn of(&self, picture: &Arc<Texels>) -> Arc<Texels> {
-        if self.channel.is_none() && self.range == Vec2::Y {
+        if self.is_plain() {
             return Arc::clone(picture);
         }
         let moved = |byte: u8| (f32::from(byte) * self.range.y + self.range.x * 255.0).round() as u8;
@@ -93,9 +107,9 @@ impl<'a> Map<'a> {
                 Some('r') => [r, r, r, 255],
                 Some('g') => [g, g, g, 255],
                 Some('b') => [b, b, b, 255],
-                Some('m') => [a, a, a, 255],
+                Some('m') => [moved(a), moved(a), moved(a), 255],
                 Some('l') => {
-                    let grey = (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)) as u8;
+                    let grey = luminance(Vec3::new(r.into(), g.into(), b.into())).round() as u8;
                     [grey, grey, grey, 255]
                 }
                 _ => [r, g, b, a],
@@ -108,6 +122,10 @@ impl<'a> Map<'a> {
     fn uv_transform(&self) -> Affine2 {
         let offset = Vec2::new(self.offset.x, 1.0 - self.scale.y - self.offset.y);
         Affine2::from_scale_angle_translation(self.scale, 0.0, offset)
+    }
+
+    fn used(&self, texture: Entity) -> TextureUse {
+        TextureUse { texture, uv_transform: self.uv_transform(), second_uvs: false }
     }
 
     fn wrap(&self) -> [Wrap; 2] {
@@ -149,14 +167,16 @@ pub(super) fn beside(library: &str, statement: &str) -> String {
 
 /// Looks for a picture; where there is none of that name, `#` may begin a comment.
 fn read(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
-    let bare = unquoted(before_comment(name));
-    read_named(folder, name).or_else(|why| if bare == name { Err(why) } else { read_named(folder, bare) })
+    let (library, own) = name.split_once(BESIDE).map_or((None, name), |(library, own)| (Some(library), own));
+    let bare = unquoted(before_comment(own));
+    let named = read_named(folder, library, own);
+    named.or_else(|why| if bare == own { Err(why) } else { read_named(folder, library, bare) })
 }
 
 /// In the folder of its library, then in the scene's.
-fn read_named(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
-    let Some((library, own)) = name.split_once(BESIDE) else {
-        return folder.read_or_neighbour(name, IMAGE_LIMIT);
+fn read_named(folder: &Folder, library: Option<&str>, own: &str) -> Result<Bytes, ReadError> {
+    let Some(library) = library else {
+        return folder.read_or_neighbour(own, IMAGE_LIMIT);
     };
     let bare = own.rsplit(['/', '\\']).next().unwrap_or(own);
     let there = [own, bare].map(|name| format!("{library}/{name}"));
@@ -168,13 +188,14 @@ fn read_named(folder: &Folder, name: &str) -> Result<Bytes, ReadError> {
 
 /// Decoded images of a library by file name.
 pub(super) struct Textures {
+    file: String,
     images: BTreeMap<String, Arc<Texels>>,
     /// Names of those that could not be read.
     missing: BTreeSet<String>,
     spawned: BTreeMap<Key, Entity>,
 }
 
-/// What a texture is made of: for what, by which statements, and whether it is clamped.
+/// What a texture is made of: for what, of what of which pictures, and whether it is clamped.
 type Key = (&'static str, String, String, bool);
 
 impl Textures {
@@ -199,7 +220,8 @@ impl Textures {
         let missing = unread.map(|(name, _)| name.clone()).collect();
         let (names, pictures): (Vec<String>, Vec<Picture<'_>>) = pictures.into_iter().unzip();
         let texels = picture::decode_all(file, &pictures, sink);
-        Self { images: names.into_iter().zip(texels).collect(), missing, spawned: BTreeMap::new() }
+        let file = file.to_owned();
+        Self { file, images: names.into_iter().zip(texels).collect(), missing, spawned: BTreeMap::new() }
     }
 
     /// Whether the material has such a statement, and its picture is there.
@@ -243,13 +265,24 @@ impl Textures {
         if self.missing.contains(map.name) {
             return None;
         }
-        let texels = map.of(self.images.get(map.name)?);
+        let given = self.images.get(map.name)?;
+        if !map.is_plain() {
+            self.afford(given, &map, sink)?;
+        }
+        let texels = map.of(given);
         let is_normal_map = is_normal_map || relief::is_normal_map(&texels);
         let kind = if is_normal_map { "normals" } else { "heights" };
-        let key = (kind, statement.to_owned(), String::new(), map.clamp);
+        let key = (kind, map.source(), map.bump.to_string(), map.clamp);
+        if let Some(&known) = self.spawned.get(&key) {
+            return Some(NormalMap {
+                texture: map.used(known),
+                scale: if is_normal_map { map.bump } else { 1.0 },
+            });
+        }
         let texels = if is_normal_map {
             texels
         } else {
+            self.afford(&texels, &map, sink)?;
             Arc::new(relief::normals_of_heights(&texels, map.bump, map.clamp))
         };
         let texture = self.spawn(key, texels, Encoding::Linear, &map, sink);
@@ -269,18 +302,37 @@ impl Textures {
         let statements = keywords.map(|keyword| statement(material, keyword));
         let maps = statements.map(|statement| statement.map(Map::parse));
         let main = maps[0].as_ref().or(maps[1].as_ref())?.clone();
+        let [a, b] = maps.each_ref().map(|map| map.as_ref().map_or(String::new(), Map::source));
+        let key = (kind, a, b, main.clamp);
+        if let Some(&known) = self.spawned.get(&key) {
+            return Some(main.used(known));
+        }
+        if maps.iter().flatten().count() > 1 || !main.is_plain() || encoding != Encoding::Srgb {
+            self.afford(self.images.get(main.name)?, &main, sink)?;
+        }
         let picture = |map: &Option<Map<'_>>| {
             let map = map.as_ref()?;
             self.images.get(map.name).map(|picture| map.of(picture))
         };
         let [first, second] = maps.each_ref().map(picture);
-        let [a, b] = statements.map(|statement| statement.unwrap_or_default().to_owned());
         let texels = match (first, second) {
             (None, None) => return None,
             (Some(only), None) if encoding == Encoding::Srgb => only,
             (first, second) => Arc::new(join(first.as_deref(), second.as_deref())),
         };
-        Some(self.spawn((kind, a, b, main.clamp), texels, encoding, &main, sink))
+        Some(self.spawn(key, texels, encoding, &main, sink))
+    }
+
+    /// Asks for the memory of copies that the options of a statement make of a picture; without it the statement is left out.
+    fn afford(&self, picture: &Texels, map: &Map<'_>, sink: &mut Sink<'_>) -> Option<()> {
+        // One for a channel of its own, one for two pictures together.
+        let bytes = 8 * picture.texels.len() as u64;
+        let place = format!("texture `{}`", map.name.replace(BESIDE, "/"));
+        let taken = sink.budget.take(bytes, &self.file, &place);
+        if taken.is_err() {
+            sink.ignored(&self.file, &place, "left out: too large for the memory allowed (see --max-memory)");
+        }
+        taken.ok()
     }
 
     fn spawn(
@@ -295,7 +347,7 @@ impl Textures {
             let texture = Texture { texels, encoding, wrap: map.wrap(), filter: Filter::Bilinear };
             sink.spawn((Name::new(map.name.replace(BESIDE, "/")), texture))
         });
-        TextureUse { texture, uv_transform: map.uv_transform(), second_uvs: false }
+        map.used(texture)
     }
 }
 
@@ -346,10 +398,11 @@ mod tests {
         );
         assert_eq!(Map::parse("-odd name.png").name, "-odd name.png");
         let map = Map::parse("-imfchan g -mm 0.5 0.25 \"a.png\"");
-        assert_eq!((map.name, map.channel, map.range), ("a.png", Some('g'), Vec2::new(0.5, 0.25)));
+        assert_eq!((map.name, map.channel, map.range), ("\"a.png\"", Some('g'), Vec2::new(0.5, 0.25)));
         let picture = Arc::new(Texels { width: 1, height: 1, texels: vec![[0, 100, 200, 9]] });
         assert_eq!(map.of(&picture).texels, [[153, 153, 153, 255]]);
         assert_eq!(Map::parse("a.png").of(&picture).texels, picture.texels);
+        assert_eq!(Map::parse("-mm a b a.png").of(&picture).texels, picture.texels);
     }
 
     #[test]

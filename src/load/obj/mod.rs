@@ -50,6 +50,7 @@ pub(super) fn load(
     drop(text);
     drop(bytes);
     sink.budget.take(raw.memory(), file, "its lists and faces")?;
+    raw.settle(file, sink);
     raw.scale_colors(file, sink);
     raw.check(file, sink)?;
     raw.warn(file, sink);
@@ -68,14 +69,16 @@ pub(super) fn load(
     tangents::complete_for(&mut done.mesh, &materials, file, "", sink);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
-    if raw.origin != DVec3::ZERO
-        && let Some(mut transform) = sink.world.get_mut::<Transform>(root)
-    {
-        transform.0 *= DAffine3::from_translation(raw.origin);
-    }
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
-        sink.world.entity_mut(root).insert(Instance { mesh, materials });
+        // What one moves by hand is the model, wherever its file has it.
+        let holder = if raw.origin == DVec3::ZERO {
+            root
+        } else {
+            let place = Transform(DAffine3::from_translation(raw.origin));
+            sink.spawn((Name::new("place"), place, ChildOf(root)))
+        };
+        sink.world.entity_mut(holder).insert(Instance { mesh, materials });
     }
     Ok(())
 }
@@ -96,7 +99,9 @@ fn material_entity(
         return sink.spawn((Name::new("default"), Material::default()));
     };
     // Names may have `#` in them; where none is defined so, it begins a comment.
-    if let Some(&known) = library.get(name).or_else(|| library.get(lines::before_comment(name))) {
+    let bare = |name| lines::unquoted(lines::before_comment(name));
+    let same = || library.iter().find(|(other, _)| bare(other) == bare(name)).map(|(_, entity)| entity);
+    if let Some(&known) = library.get(name).or_else(same) {
         return known;
     }
     if let Some(replacement) = overrides.replacement(name) {

@@ -217,8 +217,8 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         });
     let opacity = within(opacity.unwrap_or(1.0), 0.0, 1.0);
     let mut fraction = |keyword: &str| scalar(material, keyword).map(|value| within(value, 0.0, 1.0));
-    let is_pbr =
-        ["Pr", "Pm", "Ps", "Pc", "aniso", "map_Pr", "map_Pm"].iter().any(|keyword| is_mapped(keyword));
+    let is_pbr = ["Pr", "Pm", "map_Pr", "map_Pm"].iter().any(|keyword| is_mapped(keyword))
+        || ["Ps", "Pc", "aniso"].iter().any(|keyword| fraction(keyword).is_some_and(|factor| factor > 0.0));
     // A picture of what is 0 would not be seen.
     let mut factor = |keyword: &str, map: &str, unsaid: f32| match fraction(keyword) {
         Some(value) if value > 0.0 || !is_mapped(map) => value,

@@ -9,9 +9,10 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Stands for "no index given".
 pub(super) const NONE: u32 = u32::MAX;
-/// Where the first vertex is so far off, coordinates are read as differences to it: single precision would dent what they
-/// say. Farther off nothing is meant.
-const FAR: std::ops::Range<f64> = 4096.0..1e15;
+/// What is so far from zero, and this many times as far as it is large, is counted from a place of its own: single precision
+/// would dent it.
+const FAR: f64 = 4096.0;
+const FAR_FOR_ITS_SIZE: f64 = 16.0;
 /// Different statements that are left out and named.
 const MOST_SKIPPED: usize = 24;
 
@@ -47,11 +48,13 @@ enum Skipped {
 /// An OBJ file as it is written.
 #[derive(Default)]
 pub(super) struct Raw {
-    /// Counted from `origin`.
+    /// As in the file.
+    pub(super) places: Vec<DVec3>,
+    /// Counted from `origin`, once all is read.
     pub(super) positions: Vec<Vec3>,
-    /// Where the file's zero is not near enough for single precision, a place among its vertices.
+    /// Where the file's zero is not near enough for single precision, a place amid what is seen.
     pub(super) origin: DVec3,
-    /// Empty, or as long as `positions`.
+    /// Empty, or as long as `places`.
     pub(super) colors: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
     pub(super) normals: Vec<Vec3>,
@@ -112,16 +115,12 @@ impl Raw {
         if count < 3 {
             return Err(format!("vertex of {count} coordinates instead of 3"));
         }
-        let position = DVec3::new(values[0], values[1], values[2]);
-        if self.positions.is_empty() && FAR.contains(&position.abs().max_element()) {
-            self.origin = position.round();
-        }
-        self.positions.push((position - self.origin).as_vec3());
+        self.places.push(DVec3::new(values[0], values[1], values[2]));
         // Six numbers end in a colour; seven have a weight before it.
         let color =
             if count >= 6 { Some(DVec3::from_slice(&values[count - 3..count]).as_vec3()) } else { None };
         if color.is_some() && self.colors.is_empty() {
-            self.colors.resize(self.positions.len() - 1, Vec3::ONE);
+            self.colors.resize(self.places.len() - 1, Vec3::ONE);
         }
         if color.is_some() || !self.colors.is_empty() {
             self.colors.push(color.unwrap_or(Vec3::ONE));
@@ -134,7 +133,7 @@ impl Raw {
         for word in statement.rest.split_ascii_whitespace().take_while(|word| !word.starts_with('#')) {
             let mut parts = word.split('/');
             let mut index = |count: usize, what: &str| resolve(parts.next(), count, what);
-            let position = index(self.positions.len(), "vertex")?;
+            let position = index(self.places.len(), "vertex")?;
             let uv = index(self.uvs.len(), "texture coordinate (vt)")?;
             let normal = index(self.normals.len(), "normal (vn)")?;
             if position == NONE {
@@ -171,6 +170,28 @@ impl Raw {
         Ok(slot)
     }
 
+    /// Finds the origin, and brings all places to single precision.
+    pub(super) fn settle(&mut self, file: &str, sink: &mut Sink<'_>) {
+        let seen = self.corners.iter().filter_map(|corner| self.places.get(corner.position as usize));
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for place in seen.filter(|place| place.is_finite() && place.abs().max_element() < 1e15) {
+            (low, high) = (low.min(*place), high.max(*place));
+        }
+        let (middle, extent) = ((low + high) * 0.5, (high - low).max_element());
+        if middle.is_finite() && middle.abs().max_element() > FAR.max(FAR_FOR_ITS_SIZE * extent) {
+            // In steps, so that it stays when a little is changed.
+            let step = if extent > 0.0 { extent.log2().ceil().exp2() } else { 1.0 };
+            self.origin = (middle / step).round() * step;
+            let [x, y, z] = self.origin.to_array();
+            sink.decide(
+                file,
+                format!("far from zero: counted from {x}, {y}, {z}, for the sake of its last digits"),
+            );
+        }
+        let places = std::mem::take(&mut self.places);
+        self.positions = places.into_iter().map(|place| (place - self.origin).as_vec3()).collect();
+    }
+
     /// Brings colours to linear ones from 0 to 1: other programs write them as they are shown, some as bytes.
     pub(super) fn scale_colors(&mut self, file: &str, sink: &mut Sink<'_>) {
         let most = self.colors.iter().filter(|c| c.is_finite()).map(|c| c.max_element()).fold(0.0, f32::max);
@@ -188,7 +209,7 @@ impl Raw {
 
     /// Bytes that this and the mesh made of it take, with what building a hierarchy over it does.
     pub(super) fn memory(&self) -> u64 {
-        let lists = 12 * self.positions.len() + 12 * self.colors.len() + 8 * self.uvs.len();
+        let lists = 36 * self.places.len() + 12 * self.colors.len() + 8 * self.uvs.len();
         let triangles = self.corners.len() - 2 * self.faces.len();
         let here = lists + 12 * self.normals.len() + 12 * self.corners.len() + 16 * self.faces.len();
         (here + 60 * self.corners.len() + (14 + 80) * triangles) as u64

@@ -5,7 +5,7 @@ use super::Selection;
 use super::marks::ends_of;
 use crate::bvh::Ray;
 use crate::scene::{GlobalTransform, Hidden, Instance, Light, Visible};
-use crate::sync::{Entities, RenderOrigin};
+use crate::sync::{self, Entities, RenderOrigin};
 use crate::trace::{Geometry, Lights, RenderSettings, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, Vec2};
@@ -45,7 +45,7 @@ pub(super) fn pick(world: &World, cursor: DVec2, marked: bool) -> Option<Selecti
     let geometry = world.resource::<Geometry>();
     let viewpoint = world.resource::<Viewpoint>();
     let ray = ray_through(viewpoint, world.resource::<RenderSettings>(), cursor);
-    let hit = geometry.tlas.closest_hit(&ray);
+    let hit = sync::traceable(world).first_seen(&ray);
     let entities = world.resource::<Entities>();
     let t_max = hit.map_or(f32::INFINITY, |hit| hit.t);
     let lamp = world.resource::<Lights>().closest(&Ray { t_max, ..ray });
