@@ -62,7 +62,6 @@ pub fn change_navigation(
 }
 
 /// F: pivot and focal plane to what is under the cursor.
-#[expect(clippy::too_many_arguments, reason = "what it looks at, and what it sets")]
 pub fn focus(
     input: Res<Input>,
     scene: Traceable,

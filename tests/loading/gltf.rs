@@ -9,7 +9,7 @@ fn a_primitive_without_normals_or_indices_is_flat_and_light_grey() {
     let mesh = only_mesh(&mut world);
     assert!(mesh.normals.is_empty());
     assert_eq!(mesh.uvs[2], Vec2::new(0.0, 1.0));
-    assert_eq!(named::<Material>(&mut world, "default"), Material::default());
+    assert_eq!(named::<Material>(&mut world, "default"), Material { culled: true, ..Material::default() });
     assert_says(&report.decisions().join("\n"), "light grey");
 }
 
