@@ -13,11 +13,11 @@ pub fn run(args: &CheckArgs) -> u8 {
         let card = Card::check(file, &options);
         worst = worst.max(card.verdict);
         if !args.json {
-            line(format_args!("{}", card.text()));
+            line(card.text());
             continue;
         }
         match serde_json::to_string(&card) {
-            Ok(json) => line(format_args!("{json}")),
+            Ok(json) => line(json),
             Err(error) => return exit::because(&error, exit::FAILED),
         }
     }

@@ -13,7 +13,7 @@ pub fn run(args: &CompareArgs) -> u8 {
     };
     if args.json {
         match serde_json::to_string(&difference) {
-            Ok(json) => line(format_args!("{json}")),
+            Ok(json) => line(json),
             Err(error) => return exit::because(&error, exit::FAILED),
         }
     } else {

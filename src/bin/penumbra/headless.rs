@@ -118,7 +118,7 @@ fn finish(summary: &RenderSummary, output: &OutputArgs) -> u8 {
     }
     if output.json {
         match serde_json::to_string(summary) {
-            Ok(json) => line(format_args!("{json}")),
+            Ok(json) => line(json),
             Err(error) => return exit::because(&error, exit::FAILED),
         }
     }

@@ -93,7 +93,7 @@ fn chosen(all: &[Case], wanted: &[String]) -> Result<Vec<Case>, String> {
 
 fn print(tried: &[Tried], args: &TortureArgs) -> serde_json::Result<()> {
     if args.json {
-        line(format_args!("{}", torture::json(tried)?));
+        line(torture::json(tried)?);
     } else if args.markdown {
         line(torture::markdown(tried).trim_end());
     } else {
