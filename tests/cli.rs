@@ -309,3 +309,23 @@ fn the_manual_has_a_page_for_each_command_with_all_its_flags() {
     let (code, _, said) = run("man", &["man", "file"]);
     assert!(code == Some(1) && said.contains("file"), "{said}");
 }
+
+#[test]
+fn who_does_not_read_on_breaks_nothing() {
+    let listed = |out: Stdio| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_penumbra"));
+        program.args(["torture", "--list"]).stdin(Stdio::null()).stdout(out).stderr(Stdio::piped());
+        let output = program.output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    // As `| head` does: nobody reads any more.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    assert_eq!(listed(writer.into()), (Some(0), String::new()));
+    // Where there is no room, what was printed is not there.
+    if let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") {
+        let (code, said) = listed(full.into());
+        assert_eq!(code, Some(1));
+        assert!(said.contains("standard output"), "{said}");
+    }
+}
