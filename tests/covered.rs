@@ -36,13 +36,13 @@ fn a_lamp_shines_as_far_as_it_is_there() {
 }
 
 /// A wall between the eye and a floor, seen from behind; light comes from the eye's side, or from beyond the wall.
-fn behind_a_wall(culled: bool, light: DVec3, integrator: Integrator) -> f64 {
+fn behind_a_wall(culled: bool, place: DAffine3, light: DVec3, integrator: Integrator) -> f64 {
     let mut stage = Stage::new(settings(8, 8, integrator, 1));
     let floor = quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
     stage.add_mesh(floor, Material::lambert(Vec3::ONE), HERE);
     // Its front looks down at the floor.
     let wall = quad(Vec3::new(-0.5, -0.5, 1.0), Vec3::Y, Vec3::X);
-    stage.add_mesh(wall, Material { culled, ..Material::lambert(Vec3::ZERO) }, HERE);
+    stage.add_mesh(wall, Material { culled, ..Material::lambert(Vec3::ZERO) }, place);
     stage.add(Light::Point { intensity: Vec3::ONE }, DAffine3::from_translation(light));
     stage.look(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::Y, 1e-5);
     Estimate::of(&reds(stage.trace(4))).mean
@@ -50,12 +50,15 @@ fn behind_a_wall(culled: bool, light: DVec3, integrator: Integrator) -> f64 {
 
 #[test]
 fn the_eye_sees_through_a_back_that_is_culled_and_light_does_not() {
-    for integrator in [Integrator::Direct, Integrator::Path] {
+    // The front of a mirror image is the mirror image of the front.
+    let places = [HERE, DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0))];
+    let each = |integrator| places.map(|place| (integrator, place));
+    for (integrator, place) in [Integrator::Direct, Integrator::Path].into_iter().flat_map(each) {
         let (above, below) = (DVec3::new(0.0, 0.0, 2.0), DVec3::new(0.0, 0.0, 0.5));
-        assert_eq!(behind_a_wall(false, below, integrator), 0.0, "the wall is black");
+        assert_eq!(behind_a_wall(false, place, below, integrator), 0.0, "the wall is black");
         // Intensity over the distance squared and π.
-        let floor = behind_a_wall(true, below, integrator);
+        let floor = behind_a_wall(true, place, below, integrator);
         assert!((floor - 4.0 / std::f64::consts::PI).abs() < 1e-3, "{floor}");
-        assert_eq!(behind_a_wall(true, above, integrator), 0.0, "in the wall's shadow");
+        assert_eq!(behind_a_wall(true, place, above, integrator), 0.0, "in the wall's shadow");
     }
 }

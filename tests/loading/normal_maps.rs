@@ -30,6 +30,15 @@ fn a_normal_map_brings_tangents_of_its_own_texture_coordinates() {
 }
 
 #[test]
+fn tangents_follow_the_picture_however_it_is_turned() {
+    let transform = r#""normalTexture":{"index":0,"extensions":{"KHR_texture_transform":{"scale":[-1,1]}}}"#;
+    let (mut world, report) = loaded("a.gltf", &with_maps(r#","NORMAL":2"#, transform));
+    assert_eq!(report.warnings(), [""; 0]);
+    // The mirror image of what it is without: u grows the other way, v as before.
+    assert_eq!(only_mesh(&mut world).tangents, [Vec4::new(-1.0, 0.0, 0.0, 1.0); 3]);
+}
+
+#[test]
 fn texture_coordinates_without_area_leave_the_normal_map_out_and_say_so() {
     let text = with_maps(r#","NORMAL":2"#, r#""normalTexture":{"index":0}"#)
         .replace(r#""byteOffset":36,"componentType":5126"#, r#""byteOffset":24,"componentType":5126"#);
