@@ -22,6 +22,9 @@ pub struct Blas {
 impl Blas {
     /// Builds over `triangles`, which `Hit::triangle` will index. Those without an area or with a corner
     /// that is not finite have no surface and are never hit.
+    ///
+    /// # Panics
+    /// With more than [`MOST_TRIANGLES`](super::MOST_TRIANGLES).
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
         let (wide, rows) = build_triangles(triangles);

@@ -30,7 +30,7 @@ pub mod wide;
 
 pub use aabb::Aabb;
 pub use blas::Blas;
-pub use build::{Bvh, Defect, Node};
+pub use build::{Bvh, Defect, MOST_TRIANGLES, Node};
 pub use filter::Accept;
 pub use probe::Probe;
 pub use ray::{Hit, Ray};

@@ -134,15 +134,22 @@ impl WideNode {
         for octant in 0..4 {
             let sign = |axis: usize| if octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
             let diagonal = Vec3::new(sign(0), sign(1), sign(2));
-            let mut slots: [(f32, u32); WIDTH] = std::array::from_fn(|slot| {
-                // Empty ones last; they are never entered.
-                let along = middles[slot].dot(diagonal);
-                (if along.is_finite() { -along } else { f32::INFINITY }, slot as u32)
+            // Empty ones last; they are never entered.
+            let keys = middles.map(|middle| {
+                let along = middle.dot(diagonal);
+                if along.is_finite() { -along } else { f32::INFINITY }
             });
-            slots.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let in_order = |order: u32, (i, &(_, slot)): (usize, &(f32, u32))| order | slot << (3 * i);
-            self.orders[octant] = slots.iter().enumerate().fold(0, in_order);
-            self.orders[7 - octant] = slots.iter().rev().enumerate().fold(0, in_order);
+            let (mut order, mut reversed) = (0, 0);
+            for (slot, key) in keys.iter().enumerate() {
+                // How many come before it: without branches, which could not be foretold.
+                let before =
+                    |(other, k): (usize, &f32)| u32::from(k < key) | u32::from(k == key && other < slot);
+                let place: u32 = keys.iter().enumerate().map(before).sum();
+                order |= (slot as u32) << (3 * place);
+                reversed |= (slot as u32) << (3 * (WIDTH as u32 - 1 - place));
+            }
+            self.orders[octant] = order;
+            self.orders[7 - octant] = reversed;
         }
     }
 }

@@ -1,19 +1,19 @@
 //! Top down by the surface area heuristic in bins.
 //!
 //! Reference: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007. Each level is
-//! two passes over the list: one sorts it into bins, the other parts it in two and finds the extents of
-//! both halves on the way.
+//! two passes over the list: one sorts it into bins, which then know the boxes of both halves, the other parts
+//! it in two. Where the centres are is looked up only in lists that are in the cache; those of longer ones are
+//! taken to be anywhere in the box and where the list's they came from are.
 
 use super::bins::{Bins, Grid, best_plane};
-use super::prim::{Extent, Prim, half_area};
-use super::{Bvh, Node, SAH_LEVELS};
+use super::prim::{Extent, Prim};
+use super::{Bvh, Node, PIECE, SAH_LEVELS};
+use crate::bvh::merge::leaf_cost;
 use glam::{Vec3, Vec4Swizzles};
 use rayon::prelude::*;
 
-/// Cost of visiting a node over that of testing a triangle.
-const NODE_COST: f32 = 1.0;
-/// Lists of at least this length are shared out among threads in pieces of this length.
-const PIECE: usize = 1 << 14;
+/// Lists of at least this length are shared out among threads.
+const LONG: usize = 2 * PIECE;
 /// Subtrees over fewer are one task.
 const TASK: usize = 1 << 13;
 
@@ -52,7 +52,7 @@ pub(super) fn build<T: Send>(
     let mut spare = bytemuck::zeroed_vec(prims.len());
     let mut order = vec![0; prims.len()];
     let all = Order { first: 0, order: &mut order };
-    (large(&mut prims, &mut spare, all, extent, max_leaf, 0, finish), order)
+    (large(&mut prims, &mut spare, all, [extent; 2], max_leaf, 0, finish), order)
 }
 
 /// The same without threads' shares.
@@ -91,12 +91,13 @@ fn assemble(tree: Subtree<Vec<Node>>, slot: usize, nodes: &mut Vec<Node>) {
     }
 }
 
-/// The subtree over `prims`; with threads while it is large.
+/// The subtree over `prims`, whose boxes are in the first and whose centres are in the second of `extents`; with
+/// threads while it is large.
 fn large<T: Send>(
     prims: &mut [Prim],
     spare: &mut [Prim],
     order: Order,
-    extent: Extent,
+    [extent, centers]: [Extent; 2],
     max_leaf: usize,
     depth: usize,
     finish: &(impl Fn(Vec<Node>) -> T + Sync),
@@ -107,14 +108,15 @@ fn large<T: Send>(
         small(prims, spare, order.order, order.first, &extent, max_leaf, depth, 0, &mut nodes);
         return Subtree::Done(finish(nodes));
     }
-    let (middle, extents) = part(prims, spare, &extent, depth);
+    let centers = if prims.len() < LONG { Extent::of_centers(prims) } else { centers };
+    let (middle, extents) = part(prims, spare, &centers, depth);
+    let [left_extents, right_extents] = extents.map(|extent| [extent, centers.intersection(&extent)]);
     let (left, right) = spare.split_at_mut(middle);
     let (left_spare, right_spare) = prims.split_at_mut(middle);
     let (left_output, right_output) = order.split(middle);
-    let [left_extent, right_extent] = extents;
     let (left, right) = rayon::join(
-        || large(left, left_spare, left_output, left_extent, max_leaf, depth + 1, finish),
-        || large(right, right_spare, right_output, right_extent, max_leaf, depth + 1, finish),
+        || large(left, left_spare, left_output, left_extents, max_leaf, depth + 1, finish),
+        || large(right, right_spare, right_output, right_extents, max_leaf, depth + 1, finish),
     );
     Subtree::Inner(leaf(&extent, 0, 0), Box::new([left, right]))
 }
@@ -136,14 +138,14 @@ fn small(
     slot: usize,
     nodes: &mut Vec<Node>,
 ) {
-    if prims.len() <= max_leaf && !pays(prims, extent, max_leaf) {
+    if prims.len() == 1 || prims.len() <= max_leaf && !pays(prims, extent) {
         nodes[slot] = leaf(extent, first, prims.len());
         for (index, prim) in order.iter_mut().zip(prims) {
             *index = prim.index();
         }
         return;
     }
-    let (middle, [left, right]) = part(prims, spare, extent, depth);
+    let (middle, [left, right]) = part(prims, spare, &Extent::of_centers(prims), depth);
     let pair = nodes.len();
     nodes[slot] = leaf(extent, pair, 0);
     nodes.extend([leaf(&left, 0, 0), leaf(&right, 0, 0)]);
@@ -155,31 +157,26 @@ fn small(
     small(right_prims, right_spare, right_order, first, &right, max_leaf, depth + 1, pair + 1, nodes);
 }
 
-/// Whether splitting what would fit into a leaf is worth a node.
-fn pays(prims: &[Prim], extent: &Extent, max_leaf: usize) -> bool {
-    if prims.len() < 2 || max_leaf < 2 {
-        return false;
-    }
-    if let [a, b] = prims {
-        return NODE_COST * half_area(extent.lo, extent.hi) + half_area(a.lo, a.hi) + half_area(b.lo, b.hi)
-            < 2.0 * half_area(extent.lo, extent.hi);
-    }
-    let Some((cost, _)) = best_plane(&Bins::<4>::with(prims, Grid::new(extent, 4))) else { return false };
-    let area = half_area(extent.lo, extent.hi);
-    NODE_COST * area + cost < area * prims.len() as f32
+/// Whether what would fit into a leaf is better split: whether one leaf costs more than as many as there are prims,
+/// if nodes above had room for them.
+fn pays(prims: &[Prim], extent: &Extent) -> bool {
+    let apart: f32 = prims.iter().map(Prim::half_area).sum();
+    apart * leaf_cost(1) < extent.half_area() * leaf_cost(prims.len() as u32)
 }
 
-/// Moves `prims` to `spare`, parted in two, neither side empty; returns where, and the extents of both.
+/// Moves `prims`, whose centres are in `centers`, to `spare`, parted in two, neither side empty; returns where, and
+/// the boxes of both.
 ///
 /// The fewer there are the fewer bins: they cost more than what goes into them.
-fn part(prims: &[Prim], spare: &mut [Prim], extent: &Extent, depth: usize) -> (usize, [Extent; 2]) {
+fn part(prims: &[Prim], spare: &mut [Prim], centers: &Extent, depth: usize) -> (usize, [Extent; 2]) {
     let parted = match prims.len() {
         _ if depth >= SAH_LEVELS => None,
         // One way only.
         0..3 => None,
-        3..12 => part_binned::<4>(prims, spare, extent),
-        12..192 => part_binned::<8>(prims, spare, extent),
-        _ => part_binned::<16>(prims, spare, extent),
+        3..32 => part_binned::<4>(prims, spare, centers),
+        32..192 => part_binned::<8>(prims, spare, centers),
+        192..LONG => part_binned::<16>(prims, spare, centers),
+        _ => part_long(prims, spare, centers).or_else(|| part_long(prims, spare, &Extent::of_centers(prims))),
     };
     parted.unwrap_or_else(|| {
         spare.copy_from_slice(prims);
@@ -192,70 +189,49 @@ fn part(prims: &[Prim], spare: &mut [Prim], extent: &Extent, depth: usize) -> (u
 fn part_binned<const N: usize>(
     prims: &[Prim],
     spare: &mut [Prim],
-    extent: &Extent,
+    centers: &Extent,
 ) -> Option<(usize, [Extent; 2])> {
-    let grid = Grid::new(extent, N);
-    let pieces = prims.len() >= 2 * PIECE;
-    let bins: Bins<N> = if pieces {
-        let binned = prims.par_chunks(PIECE).map(|piece| Bins::with(piece, grid));
-        binned.reduce(|| Bins::empty(grid), Bins::union)
-    } else {
-        Bins::with(prims, grid)
-    };
+    let grid = Grid::new(centers, N);
+    let bins = Bins::<N>::with(prims, grid);
     let (_, plane) = best_plane(&bins)?;
-    let is_left = |prim: &Prim| grid.bin::<N>(prim)[plane.axis] < plane.bin;
-    Some(if pieces { part_pieces(prims, spare, is_left) } else { part_piece(prims, spare, is_left) })
-}
-
-/// Those on the left from the front, those on the right from the back.
-fn part_piece(prims: &[Prim], to: &mut [Prim], is_left: impl Fn(&Prim) -> bool) -> (usize, [Extent; 2]) {
-    let mut extents = [Extent::EMPTY; 2];
-    let (mut left, mut right) = (0, to.len());
+    let (mut left, mut right) = (0, spare.len());
     for prim in prims {
         // No branch, which could not be foretold: written to both ends, the other is overwritten later.
-        let side = usize::from(!is_left(prim));
-        to[left] = *prim;
-        to[right - 1] = *prim;
-        left += 1 - side;
-        right -= side;
-        extents[side].add(prim);
+        let is_left = usize::from(grid.is_below::<N>(&plane, prim));
+        spare[left] = *prim;
+        spare[right - 1] = *prim;
+        left += is_left;
+        right -= 1 - is_left;
     }
-    (left, extents)
+    Some((left, bins.sides(&plane)))
 }
 
 /// The same in pieces by all threads.
-fn part_pieces(
-    prims: &[Prim],
-    to: &mut [Prim],
-    is_left: impl Fn(&Prim) -> bool + Sync,
-) -> (usize, [Extent; 2]) {
-    let counts: Vec<usize> =
-        prims.par_chunks(PIECE).map(|piece| piece.iter().filter(|prim| is_left(prim)).count()).collect();
-    let middle = counts.iter().sum();
+fn part_long(prims: &[Prim], to: &mut [Prim], centers: &Extent) -> Option<(usize, [Extent; 2])> {
+    const BINS: usize = 16;
+    let grid = Grid::new(centers, BINS);
+    let pieces: Vec<Bins<BINS>> = prims.par_chunks(PIECE).map(|piece| Bins::with(piece, grid)).collect();
+    let bins = pieces.iter().fold(Bins::empty(grid), Bins::union);
+    let (_, plane) = best_plane(&bins)?;
+    let middle = bins.count_below(&plane);
     let (mut left, mut right) = to.split_at_mut(middle);
-    let mut places = Vec::with_capacity(counts.len());
-    for (piece, &count) in prims.chunks(PIECE).zip(&counts) {
+    let mut places = Vec::with_capacity(pieces.len());
+    for (piece, bins) in prims.chunks(PIECE).zip(&pieces) {
+        let count = bins.count_below(&plane);
         let (own_left, rest) = left.split_at_mut(count);
         left = rest;
         let (own_right, rest) = right.split_at_mut(piece.len() - count);
         right = rest;
         places.push((piece, own_left, own_right));
     }
-    let extents = places
-        .into_par_iter()
-        .map(|(piece, left, right)| {
-            let mut extents = [Extent::EMPTY; 2];
-            let (mut to_left, mut to_right) = (left.iter_mut(), right.iter_mut());
-            for prim in piece {
-                let side = usize::from(!is_left(prim));
-                let next = if side == 0 { to_left.next() } else { to_right.next() };
-                if let Some(place) = next {
-                    *place = *prim;
-                }
-                extents[side].add(prim);
+    places.into_par_iter().for_each(|(piece, left, right)| {
+        let (mut to_left, mut to_right) = (left.iter_mut(), right.iter_mut());
+        for prim in piece {
+            let next = if grid.is_below::<BINS>(&plane, prim) { to_left.next() } else { to_right.next() };
+            if let Some(place) = next {
+                *place = *prim;
             }
-            extents
-        })
-        .reduce(|| [Extent::EMPTY; 2], |a, b| [a[0].union(b[0]), a[1].union(b[1])]);
-    (middle, extents)
+        }
+    });
+    Some((middle, bins.sides(&plane)))
 }

@@ -1,14 +1,7 @@
 //! Boxes sorted into bins along each axis, and the cheapest plane between two.
 
-use super::prim::{Extent, Prim, half_area};
+use super::prim::{Extent, Prim};
 use glam::Vec4;
-
-/// Around what is in it.
-#[derive(Clone, Copy)]
-struct Bin {
-    lo: Vec4,
-    hi: Vec4,
-}
 
 /// Where the bins are.
 #[derive(Clone, Copy)]
@@ -19,61 +12,83 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    pub fn new(extent: &Extent, bins: usize) -> Self {
-        let size = extent.center_hi - extent.center_lo;
+    /// Over where the centres are. What is outside counts as in the outermost bins.
+    pub fn new(centers: &Extent, bins: usize) -> Self {
+        let size = centers.hi - centers.lo;
         let scale = size.map(|size| if size > 0.0 { bins as f32 / size } else { 0.0 });
         let finite = scale.map(|scale| if scale.is_finite() { scale } else { 0.0 });
-        Self { origin: extent.center_lo, scale: finite }
+        Self { origin: centers.lo, scale: finite }
     }
 
     /// For each axis the bin of a prim's centre.
     #[inline]
-    pub fn bin<const N: usize>(&self, prim: &Prim) -> [usize; 3] {
-        // Rounds down by adding so much that only whole numbers remain, which is cheaper than a cast that
-        // saturates. Monotonic, which is all that matters.
-        let place = (prim.center() - self.origin) * self.scale - 0.5;
-        let place = place.min(Vec4::splat((N - 1) as f32)).max(Vec4::ZERO) + (1 << 23) as f32;
+    fn bin<const N: usize>(&self, prim: &Prim) -> [usize; 3] {
+        let place = self.place::<N>(prim);
         [place.x, place.y, place.z].map(|place| place.to_bits() as usize % N)
     }
+
+    /// Whether it is in a bin below the plane.
+    #[inline]
+    pub fn is_below<const N: usize>(&self, plane: &Plane, prim: &Prim) -> bool {
+        self.place::<N>(prim).cmplt(Vec4::splat(ROUNDER + plane.bin as f32)).bitmask() >> plane.axis & 1 != 0
+    }
+
+    /// The numbers of the bins, added to [`ROUNDER`].
+    #[inline]
+    fn place<const N: usize>(&self, prim: &Prim) -> Vec4 {
+        let place = (prim.center() - self.origin) * self.scale - 0.5;
+        place.min(Vec4::splat((N - 1) as f32)).max(Vec4::ZERO) + ROUNDER
+    }
 }
+
+/// So large that only whole numbers remain of what is added, and these are the lowest bits: cheaper than a cast
+/// that saturates. It rounds monotonically, which is all that matters.
+const ROUNDER: f32 = (1 << 23) as f32;
 
 /// What is in the bins of each axis.
 #[derive(Clone)]
 pub(super) struct Bins<const N: usize> {
     grid: Grid,
-    bins: [[Bin; N]; 3],
+    /// Around what is in each.
+    bins: [[Extent; N]; 3],
     counts: [[u32; N]; 3],
 }
 
 impl<const N: usize> Bins<N> {
     pub fn empty(grid: Grid) -> Self {
-        let none = Bin { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
-        Self { grid, bins: [[none; N]; 3], counts: [[0; N]; 3] }
+        Self { grid, bins: [[Extent::EMPTY; N]; 3], counts: [[0; N]; 3] }
     }
 
     pub fn with(prims: &[Prim], grid: Grid) -> Self {
         let mut bins = Self::empty(grid);
         for prim in prims {
             for (axis, place) in grid.bin::<N>(prim).into_iter().enumerate() {
-                let bin = &mut bins.bins[axis][place % N];
-                bin.lo = bin.lo.min(prim.lo);
-                bin.hi = bin.hi.max(prim.hi);
+                bins.bins[axis][place % N].add(prim);
                 bins.counts[axis][place % N] += 1;
             }
         }
         bins
     }
 
-    pub fn union(mut self, other: Self) -> Self {
+    pub fn union(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             for i in 0..N {
-                let bin = &mut self.bins[axis][i];
-                bin.lo = bin.lo.min(other.bins[axis][i].lo);
-                bin.hi = bin.hi.max(other.bins[axis][i].hi);
+                self.bins[axis][i] = self.bins[axis][i].union(other.bins[axis][i]);
                 self.counts[axis][i] += other.counts[axis][i];
             }
         }
         self
+    }
+
+    /// How many are below the plane.
+    pub fn count_below(&self, plane: &Plane) -> usize {
+        self.counts[plane.axis][..plane.bin].iter().sum::<u32>() as usize
+    }
+
+    /// The boxes of what is below and of what is above the plane.
+    pub fn sides(&self, plane: &Plane) -> [Extent; 2] {
+        let (below, above) = self.bins[plane.axis].split_at(plane.bin);
+        [below, above].map(|bins| bins.iter().copied().fold(Extent::EMPTY, Extent::union))
     }
 }
 
@@ -93,20 +108,18 @@ pub(super) fn best_plane<const N: usize>(bins: &Bins<N>) -> Option<(f32, Plane)>
         let (boxes, counts) = (&bins.bins[axis], &bins.counts[axis]);
         // Cost of everything right of each plane, then sweep from the left.
         let mut right = [0.0; N];
-        let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        let (mut extent, mut count) = (Extent::EMPTY, 0);
         for i in (1..N).rev() {
-            lo = lo.min(boxes[i].lo);
-            hi = hi.max(boxes[i].hi);
+            extent = extent.union(boxes[i]);
             count += counts[i];
-            right[i] = half_area(lo, hi) * count as f32;
+            right[i] = extent.half_area() * count as f32;
         }
         let all = count + counts[0];
-        let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        let (mut extent, mut count) = (Extent::EMPTY, 0);
         for i in 1..N {
-            lo = lo.min(boxes[i - 1].lo);
-            hi = hi.max(boxes[i - 1].hi);
+            extent = extent.union(boxes[i - 1]);
             count += counts[i - 1];
-            let cost = half_area(lo, hi) * count as f32 + right[i];
+            let cost = extent.half_area() * count as f32 + right[i];
             if count > 0 && count < all && best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, Plane { axis, bin: i }));
             }

@@ -14,6 +14,7 @@ use glam::{DVec3, Vec3};
 use merge::Part;
 use prim::Prim;
 use rayon::prelude::*;
+use split::Waste;
 
 /// 32 bytes, two to a cache line. Two children are neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,12 +39,16 @@ pub struct Bvh {
     pub prims: Vec<u32>,
 }
 
+/// Triangles that fit into one mesh: with a quarter more parts of them, their numbers still fit into a leaf's 28 bits.
+pub const MOST_TRIANGLES: usize = 200_000_000;
 /// Levels split by the heuristic; below them the list is halved, which ends after 32 levels more.
 const SAH_LEVELS: usize = 32;
 /// No path from the root has more inner nodes: the bound of every traversal stack.
 pub const MAX_DEPTH: usize = SAH_LEVELS + 32;
 /// Beyond this many triangles a leaf is always split.
 const MAX_LEAF: usize = 4;
+/// Long lists are worked at in pieces of this length, by all threads.
+const PIECE: usize = 1 << 14;
 
 impl Bvh {
     /// Builds over `boxes`, all finite and not empty, each in a leaf of its own. There may be none, or many
@@ -61,22 +66,38 @@ impl Bvh {
     }
 }
 
-/// The `triangles` that have a surface, as boxes.
-fn prims_of(triangles: &[[Vec3; 3]]) -> Vec<Prim> {
-    let prim = |(index, corners): (usize, &[Vec3; 3])| {
-        if has_surface(corners) { Prim::new(Aabb::around(corners), index as u32) } else { Prim::NOTHING }
-    };
-    let mut prims: Vec<Prim> = triangles.par_iter().enumerate().with_min_len(4096).map(prim).collect();
+/// The `triangles` that have a surface, as boxes, and how much of these is empty.
+fn prims_of(triangles: &[[Vec3; 3]]) -> (Vec<Prim>, Waste) {
+    let mut prims: Vec<Prim> = bytemuck::zeroed_vec(triangles.len());
+    let pieces = prims.par_chunks_mut(PIECE).zip(triangles.par_chunks(PIECE)).enumerate();
+    let wastes: Vec<Waste> = pieces
+        .map(|(piece, (prims, triangles))| {
+            let mut waste = Waste::default();
+            for (i, (to, corners)) in prims.iter_mut().zip(triangles).enumerate() {
+                *to = if has_surface(corners) {
+                    let prim = Prim::new(Aabb::around(corners), (piece * PIECE + i) as u32);
+                    waste.add(&prim, corners);
+                    prim
+                } else {
+                    Prim::NOTHING
+                };
+            }
+            waste
+        })
+        .collect();
     // Hardly ever anything to do.
-    if !prims.par_iter().with_min_len(4096).all(Prim::is_some) {
+    if !prims.par_iter().with_min_len(PIECE).all(Prim::is_some) {
         prims.retain(Prim::is_some);
     }
-    prims
+    // In an order that does not depend on the threads.
+    (prims, wastes.into_iter().fold(Waste::default(), Waste::union))
 }
 
 /// Wide hierarchy and rows of corners over `triangles`.
 pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
-    let prims = split::split(prims_of(triangles), triangles);
+    assert!(triangles.len() <= MOST_TRIANGLES, "{} triangles in one mesh", triangles.len());
+    let (prims, waste) = prims_of(triangles);
+    let prims = split::split(prims, &waste, triangles);
     if prims.is_empty() {
         return (WideBvh::default(), Vec::new());
     }

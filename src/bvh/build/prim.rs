@@ -15,13 +15,11 @@ pub(super) struct Prim {
 /// denormal one.
 const INDEX_MARK: u32 = 0x4000_0000;
 
-/// A box and the box of the centres of what is in it. The fourth components mean nothing.
+/// A box around prims or their centres. The fourth components mean nothing.
 #[derive(Clone, Copy)]
 pub(super) struct Extent {
     pub lo: Vec4,
     pub hi: Vec4,
-    pub center_lo: Vec4,
-    pub center_hi: Vec4,
 }
 
 impl Prim {
@@ -50,6 +48,12 @@ impl Prim {
         self.lo.w.to_bits() & !INDEX_MARK
     }
 
+    /// Half its surface.
+    #[inline]
+    pub fn half_area(&self) -> f32 {
+        half_area(self.lo, self.hi)
+    }
+
     #[inline]
     pub fn center(&self) -> Vec4 {
         self.lo * 0.5 + self.hi * 0.5
@@ -57,32 +61,31 @@ impl Prim {
 }
 
 impl Extent {
-    pub const EMPTY: Self = Self {
-        lo: Vec4::INFINITY,
-        hi: Vec4::NEG_INFINITY,
-        center_lo: Vec4::INFINITY,
-        center_hi: Vec4::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
 
     #[inline]
     pub fn add(&mut self, prim: &Prim) {
-        let center = prim.center();
         self.lo = self.lo.min(prim.lo);
         self.hi = self.hi.max(prim.hi);
-        self.center_lo = self.center_lo.min(center);
-        self.center_hi = self.center_hi.max(center);
+    }
+
+    /// Half its surface, 0 if it is empty.
+    #[inline]
+    pub fn half_area(&self) -> f32 {
+        half_area(self.lo, self.hi)
     }
 
     #[inline]
     pub fn union(self, other: Self) -> Self {
-        Self {
-            lo: self.lo.min(other.lo),
-            hi: self.hi.max(other.hi),
-            center_lo: self.center_lo.min(other.center_lo),
-            center_hi: self.center_hi.max(other.center_hi),
-        }
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
+    #[inline]
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
+    }
+
+    /// Around `prims`.
     #[inline]
     pub fn of(prims: &[Prim]) -> Self {
         prims.iter().fold(Self::EMPTY, |mut extent, prim| {
@@ -90,11 +93,20 @@ impl Extent {
             extent
         })
     }
+
+    /// Around the centres of `prims`.
+    #[inline]
+    pub fn of_centers(prims: &[Prim]) -> Self {
+        prims
+            .iter()
+            .map(Prim::center)
+            .fold(Self::EMPTY, |Self { lo, hi }, center| Self { lo: lo.min(center), hi: hi.max(center) })
+    }
 }
 
-/// From the lower and the upper corner of a box.
+/// Of the box between two corners, 0 for an empty one.
 #[inline]
-pub(super) fn half_area(lo: Vec4, hi: Vec4) -> f32 {
+fn half_area(lo: Vec4, hi: Vec4) -> f32 {
     let d: Vec3 = (hi - lo).xyz().max(Vec3::ZERO);
     d.x * d.y + d.y * d.z + d.z * d.x
 }

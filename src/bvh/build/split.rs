@@ -23,40 +23,62 @@ fn budget(triangles: usize) -> usize {
     (triangles / 4).max((64 * triangles).min(40_000))
 }
 
+/// What boxes of triangles have in them beside these; sums of half areas.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Waste {
+    /// Of all boxes.
+    all: f64,
+    /// Of those that are much larger than their triangle needs.
+    slivers: f64,
+    /// Square roots of what could be saved at most.
+    roots: f64,
+}
+
+impl Waste {
+    #[inline]
+    pub fn add(&mut self, prim: &Prim, corners: &[Vec3; 3]) {
+        let (area, least) = (prim.half_area(), least_half_area(corners));
+        self.all += f64::from(area);
+        if area > SLIVER * least {
+            self.slivers += f64::from(area);
+        }
+        self.roots += root(area, least);
+    }
+
+    pub fn union(self, other: Self) -> Self {
+        let Self { all, slivers, roots } = other;
+        Self { all: self.all + all, slivers: self.slivers + slivers, roots: self.roots + roots }
+    }
+
+    /// Whether splitting is worth it.
+    fn is_much(&self) -> bool {
+        self.slivers > WORTH_SPLITTING * self.all && self.roots > 0.0 && self.roots.is_finite()
+    }
+}
+
+/// Of what could be saved of a box.
+#[inline]
+fn root(area: f32, least: f32) -> f64 {
+    f64::from((area - least).max(0.0)).sqrt()
+}
+
 /// Replaces references to whole triangles by several to parts, where that pays.
-pub(super) fn split(prims: Vec<Prim>, triangles: &[[Vec3; 3]]) -> Vec<Prim> {
-    let waste = |prim: &Prim| {
-        let area = prim.aabb().half_area();
-        let least = least_half_area(&triangles[prim.index() as usize]);
-        (area, (area - least).max(0.0), area > SLIVER * least)
-    };
-    // Sums in an order that does not depend on the threads.
-    let sums: Vec<[f64; 3]> = prims
-        .par_chunks(1 << 14)
-        .map(|piece| {
-            piece.iter().fold([0.0; 3], |[all, slivers, roots], prim| {
-                let (area, waste, is_sliver) = waste(prim);
-                let sliver = if is_sliver { f64::from(area) } else { 0.0 };
-                [all + f64::from(area), slivers + sliver, roots + f64::from(waste).sqrt()]
-            })
-        })
-        .collect();
-    let [all, slivers, roots] = sums.iter().fold([0.0; 3], |[a, b, c], s| [a + s[0], b + s[1], c + s[2]]);
-    let pays = slivers > WORTH_SPLITTING * all;
-    if !(pays && roots > 0.0 && roots.is_finite()) {
+pub(super) fn split(prims: Vec<Prim>, waste: &Waste, triangles: &[[Vec3; 3]]) -> Vec<Prim> {
+    if !waste.is_much() {
         return prims;
     }
     let bounds = prims.iter().fold(Aabb::EMPTY, |bounds, prim| bounds.union(prim.aabb()));
     let grid = Grid::new(&bounds);
-    let share = budget(prims.len()) as f64 / roots;
+    let share = budget(prims.len()) as f64 / waste.roots;
     let parts: Vec<Vec<Prim>> = prims
         .par_chunks(1 << 12)
         .map(|piece| {
             let mut parts = Vec::with_capacity(piece.len() * 5 / 4);
             for prim in piece {
-                let wanted = (f64::from(waste(prim).1).sqrt() * share).min(MAX_PARTS) as u32;
-                let corners = triangles[prim.index() as usize].map(Vec3::as_dvec3);
-                split_one(&grid, &corners, prim.aabb(), prim.index(), wanted, &mut parts);
+                let corners = &triangles[prim.index() as usize];
+                let root = root(prim.half_area(), least_half_area(corners));
+                let wanted = (root * share).min(MAX_PARTS) as u32;
+                split_one(&grid, &corners.map(Vec3::as_dvec3), prim.aabb(), prim.index(), wanted, &mut parts);
             }
             parts
         })
@@ -192,10 +214,15 @@ mod tests {
         })
     }
 
+    fn parts_of(triangles: &[[Vec3; 3]]) -> Vec<Prim> {
+        let (prims, waste) = prims_of(triangles);
+        split(prims, &waste, triangles)
+    }
+
     #[test]
     fn the_parts_of_a_triangle_cover_it() {
         let triangles = needles();
-        let mut parts = split(prims_of(&triangles), &triangles);
+        let mut parts = parts_of(&triangles);
         assert!(parts.len() > 10 * triangles.len(), "{} parts", parts.len());
         assert!(covered(&triangles, &parts));
         parts.remove(parts.len() / 2);
@@ -206,6 +233,6 @@ mod tests {
     fn what_fills_its_boxes_is_not_split() {
         let fat: Vec<_> =
             (0..50).map(|i| [Vec3::X, Vec3::Y, Vec3::ZERO].map(|p| p + Vec3::Z * i as f32)).collect();
-        assert_eq!(split(prims_of(&fat), &fat).len(), fat.len());
+        assert_eq!(parts_of(&fat).len(), fat.len());
     }
 }

@@ -5,6 +5,7 @@ use super::accessor::Elements;
 use super::deform::{self, Follower};
 use super::material::Palette;
 use super::vertices::Used;
+use crate::bvh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
 use crate::load::geometry::{self, MANY, Part};
 use crate::load::report::Sink;
@@ -19,9 +20,6 @@ use gltf::json::{self, Index};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
-
-/// Most triangles of one file, counted once a mesh: what fits into 32-bit vertex indices thrice over.
-pub(super) const MOST_TRIANGLES: usize = 1 << 28;
 
 /// A mesh in the world.
 #[derive(Clone)]
@@ -74,9 +72,10 @@ impl Meshes {
             };
             self.triangles += part.triangles.len();
             if self.triangles > MOST_TRIANGLES {
-                return Err(
-                    document.broken(place, format!("more than {MOST_TRIANGLES} triangles: too large"))
-                );
+                return Err(document.broken(
+                    place,
+                    format!("more than {MOST_TRIANGLES} triangles: too large for one scene"),
+                ));
             }
             let slot = materials.iter().position(|&known| known == material).unwrap_or_else(|| {
                 materials.push(material);

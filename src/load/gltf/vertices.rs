@@ -1,7 +1,7 @@
 //! Which vertices the triangles of a primitive use.
 
 use super::Document;
-use super::mesh::MOST_TRIANGLES;
+use crate::bvh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
 use crate::load::geometry::MANY;
 use crate::load::report::Sink;

@@ -1,6 +1,7 @@
 //! An OBJ file as it is written: lists, faces, and the line each face stands on.
 
 use super::lines::{Statement, unquoted};
+use crate::bvh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
 use crate::load::report::{Kind, Sink};
 use crate::scene::color::linear_from_srgb;
@@ -245,6 +246,13 @@ impl Raw {
     /// Faces may stand before their vertices, so indices are checked at the end.
     pub(super) fn check(&mut self, file: &str, sink: &mut Sink<'_>) -> Result<(), LoadError> {
         self.forget_absent(file, sink);
+        let triangles: usize =
+            (0..self.faces.len()).map(|i| self.corners_of(i).len().saturating_sub(2)).sum();
+        if triangles > MOST_TRIANGLES {
+            let problem =
+                format!("{triangles} triangles, more than the {MOST_TRIANGLES} of one mesh: too large");
+            return Err(LoadError::broken(file, "its faces", problem));
+        }
         for (i, face) in self.faces.iter().enumerate() {
             for corner in self.corners_of(i) {
                 let lists = [
