@@ -96,6 +96,28 @@ fn the_checker_finds_each_defect() {
 }
 
 #[test]
+fn each_octant_has_an_order_of_all_children() {
+    let dot = |center: Vec3| Aabb { min: center - 0.25, max: center + 0.25 };
+    // Equal middles, both zeros, very far, and two places without a child.
+    let far = Aabb { min: Vec3::splat(3e38), max: Vec3::splat(3.1e38) };
+    let boxes = [dot(Vec3::ZERO), dot(Vec3::ZERO), dot(-Vec3::X), dot(Vec3::X), dot(Vec3::Y), far];
+    let mut wide = WideBvh::new(&Bvh::build(&boxes), 1);
+    assert_eq!(wide.check(Some(&boxes)), Ok(()));
+    let node = &wide.nodes[0];
+    let bounds: Vec<Aabb> = (0..WIDTH).map(|slot| node.child_bounds(slot)).collect();
+    for octant in 0..8 {
+        let sign = |axis: usize| if octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
+        let diagonal = Vec3::new(sign(0), sign(1), sign(2));
+        let order = (0..WIDTH).map(|i| &bounds[(node.orders[octant] >> (3 * i) & 7) as usize]);
+        let along: Vec<f32> =
+            order.filter(|b| !b.is_empty() && b.max.x < 1e38).map(|b| b.center().dot(diagonal)).collect();
+        assert!(along.is_sorted_by(|a, b| a >= b), "octant {octant}: {along:?} is not from far to near");
+    }
+    wide.nodes[0].orders[3] ^= 1;
+    assert_eq!(wide.check(Some(&boxes)), Err(Defect::BadOrder { node: 0 }));
+}
+
+#[test]
 fn the_checker_finds_a_path_longer_than_a_traversal_stack() {
     // A chain: node 2 i is inner, node 2 i − 1 a leaf of one box beside it.
     let chain = |levels: u32| {
@@ -121,6 +143,44 @@ fn the_build_is_the_same_for_any_number_of_threads() {
     };
     let (one, four) = (build(1), build(4));
     assert_eq!((one.nodes, one.prims), (four.nodes, four.prims));
+}
+
+/// Lists that are parted in pieces, for which the outermost centres are not looked up first.
+#[test]
+fn long_lists_are_parted_well_whatever_their_boxes_are() {
+    let count = 150_000;
+    let dots = boxes(&soup(count, 0.01, 7));
+    let around = |size: f32| {
+        let mut rng = Rng(8);
+        let box_at = move |center: Vec3| Aabb { min: center - size, max: center + size };
+        (0..count).map(|_| box_at(rng.vec() * 0.01)).collect::<Vec<_>>()
+    };
+    let whole = |bound: f32| Aabb { min: Vec3::splat(-bound), max: Vec3::splat(bound) };
+    let with = |outlier: Aabb| dots.iter().copied().chain([outlier]).collect::<Vec<_>>();
+    // The sea around them: of its box's bins only those of heights would part the dots.
+    let sea = Vec3::new(1e4, 1.0, 1e4);
+    let (far, huge) = (with(Aabb { min: -sea, max: sea }), with(whole(3e38)));
+    for (name, boxes) in [
+        ("dots", &dots),
+        ("far", &far),
+        ("huge", &huge),
+        ("equal", &vec![whole(1.0); count]),
+        ("large", &around(10.0)),
+    ] {
+        let build = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| Bvh::build(boxes))
+        };
+        let (one, three) = (build(1), build(3));
+        assert_eq!(one.check(boxes), Ok(()), "{name}");
+        assert!(one.nodes == three.nodes && one.prims == three.prims, "{name}");
+    }
+    let cost = |boxes: &[Aabb]| {
+        let area = |node: &Node| f64::from(Aabb { min: node.min, max: node.max }.half_area());
+        Bvh::build(boxes).nodes.iter().filter(|node| area(node) < 1e4).map(area).sum::<f64>()
+    };
+    let ratio = cost(&far) / cost(&dots);
+    assert!((0.9..1.1).contains(&ratio), "with something large around: {ratio} times the area");
 }
 
 /// Cuts `part` of the box of each leaf in turn away, along one axis.

@@ -43,7 +43,7 @@ pub enum Child {
 }
 
 const LEAF: u32 = 1 << 31;
-const FIRST_BITS: u32 = 28;
+pub(super) const FIRST_BITS: u32 = 28;
 
 impl Child {
     /// Unpacks.
@@ -175,6 +175,10 @@ impl WideBvh {
             }
             let dangling = Defect::Dangling { node: index as u32 };
             let node = self.nodes.get(index).ok_or(dangling)?;
+            let named = |order: &u32| (0..WIDTH).fold(0_u32, |named, i| named | 1 << (order >> (3 * i) & 7));
+            if node.orders.iter().any(|order| named(order) != (1 << WIDTH) - 1) {
+                return Err(Defect::BadOrder { node: index as u32 });
+            }
             for slot in 0..WIDTH {
                 let bounds = node.child_bounds(slot);
                 if bounds.is_empty() {

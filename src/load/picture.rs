@@ -27,7 +27,12 @@ pub(super) struct Picture<'a> {
     pub(super) bytes: Result<Cow<'a, [u8]>, ReadError>,
     /// Formats beyond PNG and JPEG deserve a warning (glTF allows no others).
     pub(super) strict: bool,
+    /// What is where it cannot be had: the [`stand_in`], or nothing, as the caller decides.
+    pub(super) instead: &'static str,
 }
+
+/// [`Picture::instead`] for what shows the [`stand_in`].
+pub(super) const CHECKER: &str = "a magenta checker stands in";
 
 /// What happened to a picture.
 struct Note(Kind, String);
@@ -59,7 +64,7 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
                 Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
             };
             let texels = result.unwrap_or_else(|why| {
-                remarks.push(Note(Kind::Ignored, format!("{why}; a magenta checker stands in")));
+                remarks.push(Note(Kind::Ignored, format!("{why}; {}", picture.instead)));
                 stand_in()
             });
             (Arc::new(texels), remarks)

@@ -109,7 +109,7 @@ impl Viewer {
         match tap {
             Tap::HudLevel => self.ui.level = self.ui.level.next(),
             Tap::Graph => self.ui.graph = !self.ui.graph,
-            Tap::Help => self.ui.help = !self.ui.help,
+            Tap::Help => self.ui.help.turn(),
             Tap::Report => self.ui.report = !self.ui.report,
             Tap::Open => self.ui.prompt = Some(Prompt::new("")),
             Tap::Escape => self.escape(),
@@ -150,8 +150,8 @@ impl Viewer {
         let explains = self.status.as_ref().is_some_and(|status| status.debug.is_open());
         if self.drag.is_some() {
             self.end_drag();
-        } else if self.ui.help {
-            self.ui.help = false;
+        } else if self.ui.help.is_open() {
+            self.ui.help.close();
         } else if self.ui.report {
             self.ui.report = false;
         } else if self.ui.graph && !edits {

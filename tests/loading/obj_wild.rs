@@ -83,6 +83,9 @@ fn a_bump_map_that_is_not_there_leaves_the_surface_flat() {
     let (_, m, report) = material("map_Bump none.png");
     assert!(m.normal_map.is_none());
     assert_says(&report.warnings().join("\n"), "none.png");
+    assert_says(&report.warnings().join("\n"), "the surface stays flat");
+    let (_, _, report) = material("map_Bump none.png\nmap_Kd none.png");
+    assert_says(&report.warnings().join("\n"), "a magenta checker stands in");
 }
 
 #[test]

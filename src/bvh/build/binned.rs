@@ -1,11 +1,10 @@
 //! Top down by the surface area heuristic in bins.
 //!
-//! Reference: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007. Each level is
-//! two passes over the list: one sorts it into bins, which then know the boxes of both halves, the other parts
-//! it in two. Where the centres are is looked up only in lists that are in the cache; those of longer ones are
-//! taken to be anywhere in the box and where the list's they came from are.
+//! Reference: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007. At each level a list
+//! is sorted into bins between the outermost centres, which tells the boxes of both halves, and then parted. Of lists
+//! longer than the cache nobody looks for the outermost centres unless bins stay empty: a box has them in it.
 
-use super::bins::{Bins, Grid, best_plane};
+use super::bins::{Bins, Grid};
 use super::prim::{Extent, Prim};
 use super::{Bvh, Node, PIECE, SAH_LEVELS};
 use crate::bvh::merge::leaf_cost;
@@ -14,6 +13,8 @@ use rayon::prelude::*;
 
 /// Lists of at least this length are shared out among threads.
 const LONG: usize = 2 * PIECE;
+/// What a place in a node costs, over visiting the node.
+const PLACE_COST: f32 = 0.3;
 /// Subtrees over fewer are one task.
 const TASK: usize = 1 << 13;
 
@@ -52,7 +53,7 @@ pub(super) fn build<T: Send>(
     let mut spare = bytemuck::zeroed_vec(prims.len());
     let mut order = vec![0; prims.len()];
     let all = Order { first: 0, order: &mut order };
-    (large(&mut prims, &mut spare, all, [extent; 2], max_leaf, 0, finish), order)
+    (large(&mut prims, &mut spare, all, extent, extent, max_leaf, 0, finish), order)
 }
 
 /// The same without threads' shares.
@@ -91,13 +92,13 @@ fn assemble(tree: Subtree<Vec<Node>>, slot: usize, nodes: &mut Vec<Node>) {
     }
 }
 
-/// The subtree over `prims`, whose boxes are in the first and whose centres are in the second of `extents`; with
-/// threads while it is large.
+/// The subtree over `prims`, which are in `extent` and whose centres are in `centers`; with threads while it is large.
 fn large<T: Send>(
     prims: &mut [Prim],
     spare: &mut [Prim],
     order: Order,
-    [extent, centers]: [Extent; 2],
+    extent: Extent,
+    mut centers: Extent,
     max_leaf: usize,
     depth: usize,
     finish: &(impl Fn(Vec<Node>) -> T + Sync),
@@ -108,15 +109,20 @@ fn large<T: Send>(
         small(prims, spare, order.order, order.first, &extent, max_leaf, depth, 0, &mut nodes);
         return Subtree::Done(finish(nodes));
     }
-    let centers = if prims.len() < LONG { Extent::of_centers(prims) } else { centers };
-    let (middle, extents) = part(prims, spare, &centers, depth);
-    let [left_extents, right_extents] = extents.map(|extent| [extent, centers.intersection(&extent)]);
+    let (middle, [left_extent, right_extent]) = if prims.len() < LONG || depth >= SAH_LEVELS {
+        part(prims, spare, depth)
+    } else {
+        part_long(prims, spare, &mut centers).unwrap_or_else(|| halve(prims, spare))
+    };
+    let (left_centers, right_centers) =
+        (centers.intersection(&left_extent), centers.intersection(&right_extent));
     let (left, right) = spare.split_at_mut(middle);
     let (left_spare, right_spare) = prims.split_at_mut(middle);
-    let (left_output, right_output) = order.split(middle);
+    let (left_order, right_order) = order.split(middle);
+    let depth = depth + 1;
     let (left, right) = rayon::join(
-        || large(left, left_spare, left_output, left_extents, max_leaf, depth + 1, finish),
-        || large(right, right_spare, right_output, right_extents, max_leaf, depth + 1, finish),
+        || large(left, left_spare, left_order, left_extent, left_centers, max_leaf, depth, finish),
+        || large(right, right_spare, right_order, right_extent, right_centers, max_leaf, depth, finish),
     );
     Subtree::Inner(leaf(&extent, 0, 0), Box::new([left, right]))
 }
@@ -138,14 +144,14 @@ fn small(
     slot: usize,
     nodes: &mut Vec<Node>,
 ) {
-    if prims.len() == 1 || prims.len() <= max_leaf && !pays(prims, extent) {
+    if prims.len() <= max_leaf && !pays(prims, extent) {
         nodes[slot] = leaf(extent, first, prims.len());
         for (index, prim) in order.iter_mut().zip(prims) {
             *index = prim.index();
         }
         return;
     }
-    let (middle, [left, right]) = part(prims, spare, &Extent::of_centers(prims), depth);
+    let (middle, [left, right]) = part(prims, spare, depth);
     let pair = nodes.len();
     nodes[slot] = leaf(extent, pair, 0);
     nodes.extend([leaf(&left, 0, 0), leaf(&right, 0, 0)]);
@@ -157,43 +163,50 @@ fn small(
     small(right_prims, right_spare, right_order, first, &right, max_leaf, depth + 1, pair + 1, nodes);
 }
 
-/// Whether what would fit into a leaf is better split: whether one leaf costs more than as many as there are prims,
-/// if nodes above had room for them.
+/// Whether what would fit into a leaf is better split: whether there is a way to part it that costs less, a place in the
+/// node above included.
 fn pays(prims: &[Prim], extent: &Extent) -> bool {
-    let apart: f32 = prims.iter().map(Prim::half_area).sum();
-    apart * leaf_cost(1) < extent.half_area() * leaf_cost(prims.len() as u32)
+    let cost = |extent: &Extent, count: u32| extent.half_area() * leaf_cost(count);
+    let count = prims.len() as u32;
+    let limit = cost(extent, count) - PLACE_COST * extent.half_area();
+    // All ways to part it; the last one is always on the left.
+    (1..1_u32 << (count - 1)).any(|right| {
+        let mut sides = [Extent::EMPTY; 2];
+        for (i, prim) in prims.iter().enumerate() {
+            sides[(right >> i & 1) as usize].add(prim);
+        }
+        let number = right.count_ones();
+        cost(&sides[0], count - number) + cost(&sides[1], number) < limit
+    })
 }
 
-/// Moves `prims`, whose centres are in `centers`, to `spare`, parted in two, neither side empty; returns where, and
-/// the boxes of both.
+/// Moves `prims` to `spare`, parted in two, neither side empty; returns where, and the boxes of both.
 ///
 /// The fewer there are the fewer bins: they cost more than what goes into them.
-fn part(prims: &[Prim], spare: &mut [Prim], centers: &Extent, depth: usize) -> (usize, [Extent; 2]) {
+fn part(prims: &[Prim], spare: &mut [Prim], depth: usize) -> (usize, [Extent; 2]) {
     let parted = match prims.len() {
         _ if depth >= SAH_LEVELS => None,
         // One way only.
         0..3 => None,
-        3..32 => part_binned::<4>(prims, spare, centers),
-        32..192 => part_binned::<8>(prims, spare, centers),
-        192..LONG => part_binned::<16>(prims, spare, centers),
-        _ => part_long(prims, spare, centers).or_else(|| part_long(prims, spare, &Extent::of_centers(prims))),
+        3..32 => part_binned::<4>(prims, spare),
+        32..192 => part_binned::<8>(prims, spare),
+        _ => part_binned::<16>(prims, spare),
     };
-    parted.unwrap_or_else(|| {
-        spare.copy_from_slice(prims);
-        let middle = prims.len() / 2;
-        (middle, [Extent::of(&prims[..middle]), Extent::of(&prims[middle..])])
-    })
+    parted.unwrap_or_else(|| halve(prims, spare))
+}
+
+/// In the middle of the list.
+fn halve(prims: &[Prim], spare: &mut [Prim]) -> (usize, [Extent; 2]) {
+    spare.copy_from_slice(prims);
+    let (left, right) = prims.split_at(prims.len() / 2);
+    (left.len(), [Extent::of(left), Extent::of(right)])
 }
 
 /// At the cheapest plane between `N` bins, if there is one.
-fn part_binned<const N: usize>(
-    prims: &[Prim],
-    spare: &mut [Prim],
-    centers: &Extent,
-) -> Option<(usize, [Extent; 2])> {
-    let grid = Grid::new(centers, N);
+fn part_binned<const N: usize>(prims: &[Prim], spare: &mut [Prim]) -> Option<(usize, [Extent; 2])> {
+    let grid = Grid::new::<N>(&Extent::of_centers(prims));
     let bins = Bins::<N>::with(prims, grid);
-    let (_, plane) = best_plane(&bins)?;
+    let plane = bins.best_plane()?;
     let (mut left, mut right) = (0, spare.len());
     for prim in prims {
         // No branch, which could not be foretold: written to both ends, the other is overwritten later.
@@ -206,14 +219,17 @@ fn part_binned<const N: usize>(
     Some((left, bins.sides(&plane)))
 }
 
-/// The same in pieces by all threads.
-fn part_long(prims: &[Prim], to: &mut [Prim], centers: &Extent) -> Option<(usize, [Extent; 2])> {
-    const BINS: usize = 16;
-    let grid = Grid::new(centers, BINS);
-    let pieces: Vec<Bins<BINS>> = prims.par_chunks(PIECE).map(|piece| Bins::with(piece, grid)).collect();
-    let bins = pieces.iter().fold(Bins::empty(grid), Bins::union);
-    let (_, plane) = best_plane(&bins)?;
-    let middle = bins.count_below(&plane);
+/// The same in pieces by all threads. The centres are in `centers`, which becomes tighter if that is called for.
+fn part_long(prims: &[Prim], to: &mut [Prim], centers: &mut Extent) -> Option<(usize, [Extent; 2])> {
+    let mut binned = Binned::new(prims, centers);
+    if binned.all.has_empty_ends() {
+        let outermost = prims.par_chunks(PIECE).map(Extent::of_centers);
+        *centers = outermost.reduce(|| Extent::EMPTY, Extent::union);
+        binned = Binned::new(prims, centers);
+    }
+    let Binned { grid, pieces, all } = binned;
+    let plane = all.best_plane()?;
+    let middle = all.count_below(&plane);
     let (mut left, mut right) = to.split_at_mut(middle);
     let mut places = Vec::with_capacity(pieces.len());
     for (piece, bins) in prims.chunks(PIECE).zip(&pieces) {
@@ -227,11 +243,31 @@ fn part_long(prims: &[Prim], to: &mut [Prim], centers: &Extent) -> Option<(usize
     places.into_par_iter().for_each(|(piece, left, right)| {
         let (mut to_left, mut to_right) = (left.iter_mut(), right.iter_mut());
         for prim in piece {
-            let next = if grid.is_below::<BINS>(&plane, prim) { to_left.next() } else { to_right.next() };
+            let is_left = grid.is_below::<LONG_BINS>(&plane, prim);
+            let next = if is_left { to_left.next() } else { to_right.next() };
             if let Some(place) = next {
                 *place = *prim;
             }
         }
     });
-    Some((middle, bins.sides(&plane)))
+    Some((middle, all.sides(&plane)))
+}
+
+/// Bins for long lists.
+const LONG_BINS: usize = 16;
+
+/// A long list in bins, by pieces and all together.
+struct Binned {
+    grid: Grid,
+    pieces: Vec<Bins<LONG_BINS>>,
+    all: Bins<LONG_BINS>,
+}
+
+impl Binned {
+    fn new(prims: &[Prim], centers: &Extent) -> Self {
+        let grid = Grid::new::<LONG_BINS>(centers);
+        let pieces: Vec<_> = prims.par_chunks(PIECE).map(|piece| Bins::with(piece, grid)).collect();
+        let all = pieces.iter().fold(Bins::empty(grid), Bins::union);
+        Self { grid, pieces, all }
+    }
 }

@@ -13,9 +13,9 @@ pub(super) struct Grid {
 
 impl Grid {
     /// Over where the centres are. What is outside counts as in the outermost bins.
-    pub fn new(centers: &Extent, bins: usize) -> Self {
+    pub fn new<const N: usize>(centers: &Extent) -> Self {
         let size = centers.hi - centers.lo;
-        let scale = size.map(|size| if size > 0.0 { bins as f32 / size } else { 0.0 });
+        let scale = size.map(|size| if size > 0.0 { N as f32 / size } else { 0.0 });
         let finite = scale.map(|scale| if scale.is_finite() { scale } else { 0.0 });
         Self { origin: centers.lo, scale: finite }
     }
@@ -63,8 +63,8 @@ impl<const N: usize> Bins<N> {
         let mut bins = Self::empty(grid);
         for prim in prims {
             for (axis, place) in grid.bin::<N>(prim).into_iter().enumerate() {
-                bins.bins[axis][place % N].add(prim);
-                bins.counts[axis][place % N] += 1;
+                bins.bins[axis][place].add(prim);
+                bins.counts[axis][place] += 1;
             }
         }
         bins
@@ -90,40 +90,46 @@ impl<const N: usize> Bins<N> {
         let (below, above) = self.bins[plane.axis].split_at(plane.bin);
         [below, above].map(|bins| bins.iter().copied().fold(Extent::EMPTY, Extent::union))
     }
+
+    /// Whether nothing is in the first or last bin of an axis.
+    pub fn has_empty_ends(&self) -> bool {
+        let is_empty = |counts: &[u32; N]| counts[0] == 0 || counts[N - 1] == 0;
+        (0..3).any(|axis| self.grid.scale[axis] > 0.0 && is_empty(&self.counts[axis]))
+    }
+
+    /// The cheapest plane with something on both sides, by areas times numbers.
+    pub fn best_plane(&self) -> Option<Plane> {
+        let mut best: Option<(f32, Plane)> = None;
+        for axis in 0..3 {
+            if self.grid.scale[axis] == 0.0 {
+                continue;
+            }
+            let (boxes, counts) = (&self.bins[axis], &self.counts[axis]);
+            // Cost of everything right of each plane, then sweep from the left.
+            let mut right = [0.0; N];
+            let (mut extent, mut count) = (Extent::EMPTY, 0);
+            for i in (1..N).rev() {
+                extent = extent.union(boxes[i]);
+                count += counts[i];
+                right[i] = extent.half_area() * count as f32;
+            }
+            let all = count + counts[0];
+            let (mut extent, mut count) = (Extent::EMPTY, 0);
+            for i in 1..N {
+                extent = extent.union(boxes[i - 1]);
+                count += counts[i - 1];
+                let cost = extent.half_area() * count as f32 + right[i];
+                if count > 0 && count < all && best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                    best = Some((cost, Plane { axis, bin: i }));
+                }
+            }
+        }
+        best.map(|(_, plane)| plane)
+    }
 }
 
 /// Bins of `axis` below `bin` are left of it.
 pub(super) struct Plane {
     pub axis: usize,
     pub bin: usize,
-}
-
-/// The cheapest plane with something on both sides, and its cost: areas times numbers.
-pub(super) fn best_plane<const N: usize>(bins: &Bins<N>) -> Option<(f32, Plane)> {
-    let mut best: Option<(f32, Plane)> = None;
-    for axis in 0..3 {
-        if bins.grid.scale[axis] == 0.0 {
-            continue;
-        }
-        let (boxes, counts) = (&bins.bins[axis], &bins.counts[axis]);
-        // Cost of everything right of each plane, then sweep from the left.
-        let mut right = [0.0; N];
-        let (mut extent, mut count) = (Extent::EMPTY, 0);
-        for i in (1..N).rev() {
-            extent = extent.union(boxes[i]);
-            count += counts[i];
-            right[i] = extent.half_area() * count as f32;
-        }
-        let all = count + counts[0];
-        let (mut extent, mut count) = (Extent::EMPTY, 0);
-        for i in 1..N {
-            extent = extent.union(boxes[i - 1]);
-            count += counts[i - 1];
-            let cost = extent.half_area() * count as f32 + right[i];
-            if count > 0 && count < all && best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, Plane { axis, bin: i }));
-            }
-        }
-    }
-    best
 }

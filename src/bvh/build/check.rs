@@ -38,6 +38,12 @@ pub enum Defect {
         /// Inner nodes above it.
         depth: usize,
     },
+    /// An order of a wide node's children does not name each once.
+    #[error("node {node} has an order that leaves out a child")]
+    BadOrder {
+        /// Index of the node.
+        node: u32,
+    },
     /// An index points outside its array.
     #[error("node {node} points outside")]
     Dangling {

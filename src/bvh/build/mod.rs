@@ -39,8 +39,10 @@ pub struct Bvh {
     pub prims: Vec<u32>,
 }
 
-/// Triangles that fit into one mesh: with a quarter more parts of them, their numbers still fit into a leaf's 28 bits.
+/// Triangles that fit into one mesh: leaves tell their first entry by so many bits, and there may be a quarter more
+/// entries than triangles.
 pub const MOST_TRIANGLES: usize = 200_000_000;
+const _: () = assert!(MOST_TRIANGLES / 4 * 5 < 1 << wide::FIRST_BITS);
 /// Levels split by the heuristic; below them the list is halved, which ends after 32 levels more.
 const SAH_LEVELS: usize = 32;
 /// No path from the root has more inner nodes: the bound of every traversal stack.

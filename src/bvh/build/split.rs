@@ -23,7 +23,7 @@ fn budget(triangles: usize) -> usize {
     (triangles / 4).max((64 * triangles).min(40_000))
 }
 
-/// What boxes of triangles have in them beside these; sums of half areas.
+/// How much of the boxes of triangles is empty: sums of half areas.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Waste {
     /// Of all boxes.

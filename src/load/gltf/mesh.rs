@@ -35,7 +35,6 @@ pub(super) struct Built {
 #[derive(Default)]
 pub(super) struct Meshes {
     built: HashMap<(usize, Option<usize>), Built>,
-    triangles: usize,
 }
 
 impl Meshes {
@@ -57,6 +56,7 @@ impl Meshes {
         let label = format!("mesh {}", index.value());
         let mut parts = Vec::new();
         let mut materials: Vec<Entity> = Vec::new();
+        let mut triangles = 0;
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("{label}, primitive {i}");
             let worn = document.material_of(primitive);
@@ -70,11 +70,11 @@ impl Meshes {
             else {
                 continue;
             };
-            self.triangles += part.triangles.len();
-            if self.triangles > MOST_TRIANGLES {
+            triangles += part.triangles.len();
+            if triangles > MOST_TRIANGLES {
                 return Err(document.broken(
                     place,
-                    format!("more than {MOST_TRIANGLES} triangles: too large for one scene"),
+                    format!("more than {MOST_TRIANGLES} triangles: part it into several meshes"),
                 ));
             }
             let slot = materials.iter().position(|&known| known == material).unwrap_or_else(|| {

@@ -26,7 +26,7 @@ mod vertices;
 
 use super::budget::Budget;
 use super::error::{LoadError, choices};
-use super::report::{Phase, Sink};
+use super::report::{Kind, Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder, without_bom};
 use animation::AnimationJson;
@@ -80,8 +80,7 @@ pub(super) fn load(
     let container = container::split(file, &bytes)?;
     let json = without_bom(container.json);
     check_head(file, json, sink)?;
-    let tree = parse_tree(file, json)?;
-    let more: More = parse(file, json)?;
+    let (tree, more) = parse_all(file, json, sink)?;
     sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
@@ -242,14 +241,17 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
     })
 }
 
-/// The whole tree; once more without what `gltf::json` knows less of than the format if it fails: animations, of
-/// which it has only those of nodes, and scenes, to which it denies being empty.
-fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
-    let first = match parse(file, json) {
-        Ok(tree) => return Ok(tree),
+/// The whole tree. What fails is tried once more with integers for what exporters without these write, `4.0`, and without
+/// what `gltf::json` knows less of than the format: animations, of which it has only those of nodes, and scenes, to
+/// which it denies being empty.
+fn parse_all(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(Root, More), LoadError> {
+    let first = match parse(file, json).and_then(|tree| Ok((tree, parse(file, json)?))) {
+        Ok(all) => return Ok(all),
         Err(first) => first,
     };
     let mut value: serde_json::Value = parse(file, json)?;
+    let count = make_whole(&mut value);
+    let Ok(more) = More::deserialize(&value) else { return Err(first) };
     if let Some(root) = value.as_object_mut() {
         root.remove("animations");
         let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
@@ -257,7 +259,29 @@ fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
             scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
         }
     }
-    serde_json::from_value(value).map_err(|_| first)
+    let Ok(tree) = serde_json::from_value(value) else { return Err(first) };
+    if count > 0 {
+        let what = "whole numbers written with a decimal point".to_owned();
+        sink.remark(Kind::Repaired, file, "JSON", what, count);
+    }
+    Ok((tree, more))
+}
+
+/// Makes integers of all whole numbers, which serve for both; returns how many.
+fn make_whole(value: &mut serde_json::Value) -> usize {
+    use serde_json::Value;
+    match value {
+        Value::Number(number) => match number.as_f64() {
+            Some(x) if number.is_f64() && x.fract() == 0.0 && x.abs() < (1_u64 << 53) as f64 => {
+                *number = (x as i64).into();
+                1
+            }
+            _ => 0,
+        },
+        Value::Array(list) => list.iter_mut().map(make_whole).sum(),
+        Value::Object(map) => map.values_mut().map(make_whole).sum(),
+        _ => 0,
+    }
 }
 
 /// Refuses other versions and required extensions; warns of extensions that are merely used.

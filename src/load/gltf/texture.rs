@@ -164,7 +164,7 @@ fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image)
             .map_err(|_| ReadError::Data("lies outside its buffer")),
         (None, None) => Err(ReadError::Data("has neither a URI nor a buffer view")),
     };
-    Picture { label, bytes, strict: true }
+    Picture { label, bytes, strict: true, instead: picture::CHECKER }
 }
 
 fn sampling(

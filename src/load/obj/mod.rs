@@ -19,6 +19,7 @@ mod mtl;
 mod polygon;
 mod raw;
 mod relief;
+mod textures;
 
 use super::error::LoadError;
 use super::geometry;

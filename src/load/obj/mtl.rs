@@ -1,7 +1,8 @@
 //! MTL libraries → material entities. `tobj` parses what [`tidy`] lets through.
 
 use super::lines::{self, Statement, before_comment, unquoted};
-use super::map::{self, Textures};
+use super::map;
+use super::textures::Textures;
 use crate::load::report::{Kind, Sink};
 use crate::load::settings::Materials;
 use crate::load::source::{Folder, TEXT_LIMIT};

@@ -211,9 +211,13 @@ impl Raw {
     /// Bytes that this and the mesh made of it take, with what building a hierarchy over it does.
     pub(super) fn memory(&self) -> u64 {
         let lists = 36 * self.places.len() + 12 * self.colors.len() + 8 * self.uvs.len();
-        let triangles = self.corners.len() - 2 * self.faces.len();
         let here = lists + 12 * self.normals.len() + 12 * self.corners.len() + 16 * self.faces.len();
-        (here + 60 * self.corners.len() + (14 + 80) * triangles) as u64
+        (here + 60 * self.corners.len() + (14 + 80) * self.triangles()) as u64
+    }
+
+    /// How many the faces become.
+    fn triangles(&self) -> usize {
+        self.corners.len() - 2 * self.faces.len()
     }
 
     /// Corners of face `i`.
@@ -246,11 +250,11 @@ impl Raw {
     /// Faces may stand before their vertices, so indices are checked at the end.
     pub(super) fn check(&mut self, file: &str, sink: &mut Sink<'_>) -> Result<(), LoadError> {
         self.forget_absent(file, sink);
-        let triangles: usize =
-            (0..self.faces.len()).map(|i| self.corners_of(i).len().saturating_sub(2)).sum();
+        let triangles = self.triangles();
         if triangles > MOST_TRIANGLES {
-            let problem =
-                format!("{triangles} triangles, more than the {MOST_TRIANGLES} of one mesh: too large");
+            let problem = format!(
+                "{triangles} triangles, more than the {MOST_TRIANGLES} that fit into one mesh: part the file"
+            );
             return Err(LoadError::broken(file, "its faces", problem));
         }
         for (i, face) in self.faces.iter().enumerate() {

@@ -83,6 +83,7 @@ pub(super) fn spawn_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<Mate
             label: format!("texture `{name}`"),
             bytes: settings.folder.read_or_neighbour(name, IMAGE_LIMIT),
             strict: false,
+            instead: picture::CHECKER,
         })
         .collect();
     let texels = picture::decode_all(&settings.file, &pictures, sink);

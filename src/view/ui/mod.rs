@@ -48,8 +48,8 @@ pub struct Content<'a> {
 pub struct Ui {
     /// How much the status tells.
     pub level: Level,
-    /// Whether the help is open.
-    pub help: bool,
+    /// The help, if it is open.
+    pub help: help::Help,
     /// Whether the report of loading is open.
     pub report: bool,
     /// The line that asks for a file, if it is open.
@@ -71,7 +71,7 @@ impl Default for Ui {
         let painter = Painter::default();
         Self {
             level: Level::default(),
-            help: false,
+            help: help::Help::default(),
             report: false,
             prompt: None,
             graph: false,
@@ -197,7 +197,7 @@ impl Ui {
                 .status
                 .is_none_or(|status| status.debug == DebugStatus::default() && status.edit.is_none());
         self.level == Level::None
-            && !self.help
+            && !self.help.is_open()
             && !self.report
             && self.prompt.is_none()
             && !self.graph
@@ -241,9 +241,7 @@ impl Ui {
                 ui.label(RichText::new(text).size(16.0));
             });
         }
-        if self.help {
-            help::show(context, content.keys, content.letters);
-        }
+        self.help.show(context, content.keys, content.letters);
         if !content.notice.is_empty() {
             card(context, "notice", Align2::CENTER_BOTTOM, vec2(0.0, -style::MARGIN), |ui| {
                 ui.set_max_width(context.content_rect().width() - 6.0 * style::MARGIN);
@@ -310,7 +308,8 @@ mod tests {
         for (width, height) in [(1, 1), (3, 200), (200, 3), (40, 30), (321, 241), (1920, 1080)] {
             for display in [0.0, 1.0, 1.25, 2.0, 3.5] {
                 let open = |ui: &mut Ui| {
-                    (ui.help, ui.graph, ui.level) = (true, true, Level::All);
+                    ui.help.turn();
+                    (ui.graph, ui.level) = (true, Level::All);
                     (ui.report, ui.prompt) = (true, Some(open::Prompt::new("")));
                 };
                 drawn(UVec2::new(width, height), display, open, 90);
@@ -347,7 +346,7 @@ mod tests {
     #[test]
     fn the_same_twice_is_the_same_to_the_bit() {
         let size = UVec2::new(960, 540);
-        let open = |ui: &mut Ui| ui.help = true;
+        let open = |ui: &mut Ui| ui.help.turn();
         assert_eq!(drawn(size, 1.0, open, 50), drawn(size, 1.0, open, 50));
     }
     #[test]
