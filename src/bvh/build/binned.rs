@@ -166,18 +166,23 @@ fn small(
 /// Whether what would fit into a leaf is better split: whether there is a way to part it that costs less, a place in the
 /// node above included.
 fn pays(prims: &[Prim], extent: &Extent) -> bool {
-    let cost = |extent: &Extent, count: u32| extent.half_area() * leaf_cost(count);
-    let count = prims.len() as u32;
-    let limit = cost(extent, count) - PLACE_COST * extent.half_area();
-    // All ways to part it; the last one is always on the left.
-    (1..1_u32 << (count - 1)).any(|right| {
-        let mut sides = [Extent::EMPTY; 2];
-        for (i, prim) in prims.iter().enumerate() {
-            sides[(right >> i & 1) as usize].add(prim);
+    fn cost<const N: usize>(side: [&Prim; N]) -> f32 {
+        let extent = side.into_iter().fold(Extent::EMPTY, |extent, prim| extent.with(prim));
+        extent.half_area() * leaf_cost(N as u32)
+    }
+    let least = match prims {
+        [] | [_] => return false,
+        [a, b] => cost([a]) + cost([b]),
+        [a, b, c] => (cost([a, b]) + cost([c])).min(cost([a, c]) + cost([b])).min(cost([b, c]) + cost([a])),
+        [a, b, c, d] => {
+            let pairs = (cost([a, b]) + cost([c, d])).min(cost([a, c]) + cost([b, d]));
+            let first = pairs.min(cost([a, d]) + cost([b, c]));
+            let ends = (cost([a, b, c]) + cost([d])).min(cost([b, c, d]) + cost([a]));
+            first.min(ends).min(cost([a, b, d]) + cost([c])).min(cost([a, c, d]) + cost([b]))
         }
-        let number = right.count_ones();
-        cost(&sides[0], count - number) + cost(&sides[1], number) < limit
-    })
+        _ => return true,
+    };
+    least + PLACE_COST * extent.half_area() < extent.half_area() * leaf_cost(prims.len() as u32)
 }
 
 /// Moves `prims` to `spare`, parted in two, neither side empty; returns where, and the boxes of both.

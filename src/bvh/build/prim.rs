@@ -64,9 +64,13 @@ impl Extent {
     pub const EMPTY: Self = Self { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
 
     #[inline]
+    pub fn with(self, prim: &Prim) -> Self {
+        Self { lo: self.lo.min(prim.lo), hi: self.hi.max(prim.hi) }
+    }
+
+    #[inline]
     pub fn add(&mut self, prim: &Prim) {
-        self.lo = self.lo.min(prim.lo);
-        self.hi = self.hi.max(prim.hi);
+        *self = self.with(prim);
     }
 
     /// Half its surface, 0 if it is empty.
@@ -88,10 +92,7 @@ impl Extent {
     /// Around `prims`.
     #[inline]
     pub fn of(prims: &[Prim]) -> Self {
-        prims.iter().fold(Self::EMPTY, |mut extent, prim| {
-            extent.add(prim);
-            extent
-        })
+        prims.iter().fold(Self::EMPTY, Self::with)
     }
 
     /// Around the centres of `prims`.
