@@ -331,7 +331,7 @@ enum End {
 fn folder_exists(path: &Path) -> Result<(), ImageError> {
     match path.parent() {
         Some(folder) if folder != Path::new("") && !folder.is_dir() => {
-            let source = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder");
+            let source = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder; make it first");
             Err(ImageError::Io { path: path.to_path_buf(), source })
         }
         _ => Ok(()),

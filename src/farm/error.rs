@@ -1,6 +1,7 @@
 //! Why a film cannot be used: one line, naming the file, the place in it and the way out.
 
 use super::Ranges;
+use crate::image::files::plainly;
 use glam::UVec2;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -11,7 +12,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum FilmError {
     /// The file system refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), plainly(source))]
     Io {
         /// The file.
         path: PathBuf,

@@ -21,7 +21,7 @@ pub enum ImageError {
         path: PathBuf,
     },
     /// The file system refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), plainly(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -36,6 +36,14 @@ pub enum ImageError {
         /// The codec's reason.
         source: image::ImageError,
     },
+}
+
+/// The system's reason in words for people, who mostly have mistyped a name.
+pub(crate) fn plainly(error: &std::io::Error) -> String {
+    match (error.kind(), error.get_ref()) {
+        (std::io::ErrorKind::NotFound, None) => "no such file; check its name".to_owned(),
+        _ => error.to_string(),
+    }
 }
 
 /// What a file name asks for.
