@@ -167,7 +167,7 @@ fn small(
 /// node above included.
 fn pays(prims: &[Prim], extent: &Extent) -> bool {
     fn cost<const N: usize>(side: [&Prim; N]) -> f32 {
-        let extent = side.into_iter().fold(Extent::EMPTY, |extent, prim| extent.with(prim));
+        let extent = side.into_iter().fold(Extent::EMPTY, Extent::with);
         extent.half_area() * leaf_cost(N as u32)
     }
     let least = match prims {

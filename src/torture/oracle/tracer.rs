@@ -119,15 +119,33 @@ pub struct Answers {
     pub blocked_alone: Vec<bool>,
 }
 
-/// Asks all four questions.
+/// Asks all four questions; batches with the first half of the rays in packets, the others mostly by twos.
 #[must_use]
 pub fn ask(tracer: &dyn Tracer, rays: &[Ray]) -> Answers {
+    let order = half_alike(rays);
+    let batch: Vec<Ray> = order.iter().map(|&i| rays[i]).collect();
+    let (mut found, mut is_blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
+    tracer.closest_hits(&batch, &mut found);
+    tracer.any_hits(&batch, &mut is_blocked);
     let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
-    tracer.closest_hits(rays, &mut hits);
-    tracer.any_hits(rays, &mut blocked);
+    for (&i, (hit, is_blocked)) in order.iter().zip(found.into_iter().zip(is_blocked)) {
+        (hits[i], blocked[i]) = (hit, is_blocked);
+    }
     let hits_alone = rays.iter().map(|ray| tracer.closest_hit(ray)).collect();
     let blocked_alone = rays.iter().map(|ray| tracer.any_hit(ray)).collect();
     Answers { hits, blocked, hits_alone, blocked_alone }
+}
+
+/// The numbers of the rays, the first half with such side by side as may share a packet: in one octant, and longest
+/// along the same axis.
+fn half_alike(rays: &[Ray]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..rays.len()).collect();
+    order[..rays.len() / 2].sort_by_key(|&i| class(&rays[i]));
+    order
+}
+
+fn class(ray: &Ray) -> (u32, usize) {
+    (ray.direction.is_negative_bitmask(), ray.direction.abs().max_position())
 }
 
 impl Answers {
@@ -157,5 +175,32 @@ impl Answers {
     #[must_use]
     pub fn leaks(&self) -> u64 {
         self.wrong_by(|_, hit| hit.is_some(), |_| true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::torture::oracle::Rng;
+
+    #[test]
+    fn half_of_a_batch_goes_in_packets() {
+        let mut rng = Rng(3);
+        let rays: Vec<Ray> = (0..1024).map(|_| Ray::new(Vec3::ZERO, rng.direction())).collect();
+        let order = half_alike(&rays);
+        assert!(order[512..].iter().copied().eq(512..1024));
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.into_iter().eq(0..1024));
+        // Batches are parted by 64 rays, and six alike make a packet.
+        let in_packets = |part: &[usize]| {
+            let chunks = part.chunks(64);
+            let many = |chunk: &[usize], i: usize| {
+                chunk.iter().filter(|&&j| class(&rays[j]) == class(&rays[i])).count() >= 6
+            };
+            chunks.map(|chunk| chunk.iter().filter(|&&i| many(chunk, i)).count()).sum::<usize>()
+        };
+        let (alike, mixed) = (in_packets(&order[..512]), in_packets(&order[512..]));
+        assert!(alike > 450 && mixed < 100, "{alike} and {mixed} of 512");
     }
 }

@@ -9,12 +9,10 @@ use egui::{Align2, Context, FontId, Grid, RichText, Ui, Vec2, vec2};
 /// Lines that a section takes beside its rows.
 const HEADING_LINES: usize = 2;
 /// Points of letters that can still be read.
-const LEGIBLE: f32 = 9.0;
-/// Lines and letters of that size: a line is a letter and a half high, a letter half as wide.
+const LEGIBLE: f32 = 7.0;
+/// Height of a line and width of the widest column, over the size of letters.
 const LINE: f32 = 1.62;
-const LETTER: f32 = 1.0 / 1.9;
-/// Letters of the widest column.
-const COLUMN: f32 = 46.0;
+const COLUMN: f32 = 42.0;
 
 /// What of the help is open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,14 +43,16 @@ impl Help {
     pub fn show(&mut self, context: &Context, keys: &Keymap, letters: &Letters) {
         let Some(page) = self.page else { return };
         let room = context.content_rect().size() * 0.94;
-        let columns = if room.x > 560.0 { 2 } else { 1 };
-        let mut pages = vec![split(columns)];
-        let mut size = fitting(&pages[0], room);
+        // Of equally good ways the last is taken: with the fewest columns.
+        let ways = (1..=3).rev().map(split).map(|columns| (fitting(&columns, room), columns));
+        let Some((mut size, columns)) = ways.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { return };
+        let mut pages = vec![columns];
         if size < LEGIBLE {
-            size = LEGIBLE.min(room.x / COLUMN / LETTER).max(6.0);
+            size = LEGIBLE.min(room.x / COLUMN);
             let lines = (room.y / (size * LINE)) as usize;
-            // One line tells which page it is.
-            pages = parted(lines.saturating_sub(3)).chunks(columns).map(<[_]>::to_vec).collect();
+            let columns = ((room.x / (COLUMN * size)) as usize).max(1);
+            // Two lines below, and the borders.
+            pages = parted(lines.saturating_sub(4)).chunks(columns).map(<[_]>::to_vec).collect();
         }
         self.pages = pages.len();
         let page = page.min(self.pages - 1);
@@ -68,12 +68,11 @@ impl Help {
                     });
                 }
             });
-            let star = "* starts the picture again";
-            let foot = match self.pages {
-                1 => star.to_owned(),
-                pages => format!("{star}   {} of {pages}: the same key turns the page", page + 1),
-            };
-            ui.label(text(&foot, size).color(FAINT));
+            ui.label(text("* starts the picture again", size).color(FAINT));
+            if self.pages > 1 {
+                let foot = format!("page {} of {}; the same key turns it", page + 1, self.pages);
+                ui.label(text(&foot, size).color(ACCENT));
+            }
         });
     }
 }
@@ -82,7 +81,7 @@ impl Help {
 fn fitting(columns: &[Vec<Section>], room: Vec2) -> f32 {
     let lines = columns.iter().map(|column| lines_of(column)).max().unwrap_or(1);
     let widest = COLUMN * columns.len() as f32;
-    (room.y / (lines as f32 * LINE)).min(room.x / widest / LETTER).clamp(6.0, 13.0)
+    (room.y / (lines as f32 * LINE)).min(room.x / widest).min(13.0)
 }
 
 fn lines_of(sections: &[Section]) -> usize {

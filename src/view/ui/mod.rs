@@ -318,6 +318,42 @@ mod tests {
     }
 
     #[test]
+    fn every_page_of_the_help_is_inside_the_window() {
+        let (keys, letters) = (Keymap::default(), Letters::default());
+        let content = Content {
+            status: None,
+            measured: Measured::default(),
+            loading: None,
+            notice: "",
+            compared: None,
+            keys: &keys,
+            letters: &letters,
+        };
+        for (width, height, most) in
+            [(1920, 1080, 1), (960, 540, 1), (640, 400, 4), (320, 240, 8), (200, 600, 8)]
+        {
+            let mut ui = Ui { level: Level::None, ..Ui::default() };
+            let mut pages = 0;
+            ui.help.turn();
+            while ui.help.is_open() {
+                let mut rgba = Vec::new();
+                for _ in 0..2 {
+                    rgba = vec![90; (4 * width * height) as usize];
+                    ui.draw(&mut rgba, UVec2::new(width, height), 1.0, &content);
+                }
+                let drawn = |x: u32, y: u32| rgba[(4 * (y * width + x)) as usize] != 90;
+                let rim = (0..width).any(|x| drawn(x, 0) || drawn(x, height - 1))
+                    || (0..height).any(|y| drawn(0, y) || drawn(width - 1, y));
+                assert!(!rim, "page {pages} in {width}x{height} is cut");
+                assert!(drawn(width / 2, height / 2));
+                pages += 1;
+                ui.help.turn();
+            }
+            assert!((1..=most).contains(&pages), "{pages} pages in {width}x{height}");
+        }
+    }
+
+    #[test]
     fn nothing_is_drawn_if_nothing_is_wanted() {
         let (keys, letters) = (Keymap::default(), Letters::default());
         let content = Content {
