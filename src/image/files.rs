@@ -41,7 +41,7 @@ pub enum ImageError {
 /// The system's reason in words for people, who mostly have mistyped a name.
 pub(crate) fn plainly(error: &std::io::Error) -> String {
     match (error.kind(), error.get_ref()) {
-        (std::io::ErrorKind::NotFound, None) => "no such file; check its name".to_owned(),
+        (std::io::ErrorKind::NotFound, None) => "no such file or folder; check the name".to_owned(),
         _ => error.to_string(),
     }
 }

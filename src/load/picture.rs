@@ -38,7 +38,13 @@ pub(super) const CHECKER: &str = "a magenta checker stands in";
 struct Note(Kind, String);
 
 /// Decodes all pictures side by side; `file` is the scene that names them.
-pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Arc<Texels>> {
+///
+/// None where a picture cannot be had, which is told.
+pub(super) fn decode_all(
+    file: &str,
+    pictures: &[Picture<'_>],
+    sink: &mut Sink<'_>,
+) -> Vec<Option<Arc<Texels>>> {
     // Decoders need as much again for a while.
     let affordable: Vec<bool> = pictures
         .iter()
@@ -49,7 +55,7 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
         .collect();
     let done = AtomicUsize::new(0);
     let watcher = &sink.options.watcher;
-    let decoded: Vec<(Arc<Texels>, Vec<Note>)> = pictures
+    let decoded: Vec<(Option<Arc<Texels>>, Vec<Note>)> = pictures
         .par_iter()
         .zip(affordable)
         .map(|(picture, affordable)| {
@@ -63,11 +69,10 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
                 }
                 Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
             };
-            let texels = result.unwrap_or_else(|why| {
+            let texels = result.map_err(|why| {
                 remarks.push(Note(Kind::Ignored, format!("{why}; {}", picture.instead)));
-                stand_in()
             });
-            (Arc::new(texels), remarks)
+            (texels.ok().map(Arc::new), remarks)
         })
         .collect();
     decoded
@@ -83,10 +88,10 @@ pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'
 }
 
 /// Magenta and black: what is missing should be seen.
-pub(super) fn stand_in() -> Texels {
+pub(super) fn stand_in() -> Arc<Texels> {
     let (magenta, black) = ([255, 0, 255, 255], [0, 0, 0, 255]);
     let texels = (0..64).map(|i| if (i % 8 + i / 8) % 2 == 0 { magenta } else { black }).collect();
-    Texels { width: 8, height: 8, texels }
+    Arc::new(Texels { width: 8, height: 8, texels })
 }
 
 fn texel_count(bytes: &[u8]) -> Option<u64> {

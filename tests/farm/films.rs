@@ -122,7 +122,7 @@ fn no_file_that_is_no_film_is_taken_for_one() {
     newer[8] = 2;
     std::fs::write(folder.join("newer.film"), &newer).unwrap();
     for (name, words) in [
-        ("none.film", vec!["no such file; check its name"]),
+        ("none.film", vec!["no such file or folder; check the name"]),
         ("short.film", vec!["bytes", "copy it again"]),
         ("empty.film", vec!["not a film"]),
         ("folder.film", vec!["not a film"]),

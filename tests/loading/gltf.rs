@@ -350,5 +350,12 @@ fn whole_numbers_may_have_a_decimal_point() {
     assert_says(&report.warnings().join("\n"), "whole numbers written with a decimal point");
     let (_, report) = loaded("a.gltf", &text);
     assert!(report.warnings().is_empty());
+    // Where something else is to be overlooked, such numbers are nothing to speak of.
+    let empty = text
+        .replace(r#""scenes":[{"nodes":[0]}]"#, r#""scenes":[{}],"scene":0"#)
+        .replace(r#""scene":0,"scenes""#, r#""scenes""#);
+    let (_, report) =
+        loaded("a.gltf", &empty.replace(r#"{"mesh":0}"#, r#"{"mesh":0,"scale":[1.0,1.0,1.0]}"#));
+    assert!(!report.warnings().join("\n").contains("decimal point"), "{:?}", report.warnings());
     assert_says(&refusal("a.gltf", &text.replace(r#""mesh":0"#, r#""mesh":0.5"#)), "not valid glTF JSON");
 }

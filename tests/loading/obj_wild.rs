@@ -84,6 +84,12 @@ fn a_bump_map_that_is_not_there_leaves_the_surface_flat() {
     assert!(m.normal_map.is_none());
     assert_says(&report.warnings().join("\n"), "none.png");
     assert_says(&report.warnings().join("\n"), "the surface stays flat");
+    let obj = format!("mtllib a.mtl\n{QUAD}usemtl m\nf 1 2 3\n");
+    let files: [(&str, &[u8]); 3] =
+        [("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl m\nmap_Bump a.png\n"), ("a.png", b"no picture")];
+    let (mut world, report) = loaded_all(&files);
+    assert_says(&report.warnings().join("\n"), "the surface stays flat");
+    assert_eq!(world.query::<&Texture>().iter(&world).count(), 0, "of a picture that is broken");
     let (_, _, report) = material("map_Bump none.png\nmap_Kd none.png");
     assert_says(&report.warnings().join("\n"), "a magenta checker stands in");
 }

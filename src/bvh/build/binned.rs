@@ -1,8 +1,9 @@
 //! Top down by the surface area heuristic in bins.
 //!
 //! Reference: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007. At each level a list
-//! is sorted into bins between the outermost centres, which tells the boxes of both halves, and then parted. Of lists
-//! longer than the cache nobody looks for the outermost centres unless bins stay empty: a box has them in it.
+//! is looked through three times: for the outermost centres, to sort it into bins between these, which tells the boxes of
+//! both halves, and to part it. Lists longer than the cache are looked through twice: their box has the outermost
+//! centres in it, and only if bins stay empty they are looked for.
 
 use super::bins::{Bins, Grid};
 use super::prim::{Extent, Prim};

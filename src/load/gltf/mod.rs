@@ -26,7 +26,7 @@ mod vertices;
 
 use super::budget::Budget;
 use super::error::{LoadError, choices};
-use super::report::{Kind, Phase, Sink};
+use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder, without_bom};
 use animation::AnimationJson;
@@ -241,46 +241,50 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
     })
 }
 
-/// The whole tree. What fails is tried once more with integers for what exporters without these write, `4.0`, and without
-/// what `gltf::json` knows less of than the format: animations, of which it has only those of nodes, and scenes, to
-/// which it denies being empty.
+/// The whole tree. What fails is tried once more without what `gltf::json` knows less of than the format, and then with
+/// integers for what exporters without these write, `4.0`.
 fn parse_all(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(Root, More), LoadError> {
     let first = match parse(file, json).and_then(|tree| Ok((tree, parse(file, json)?))) {
         Ok(all) => return Ok(all),
         Err(first) => first,
     };
     let mut value: serde_json::Value = parse(file, json)?;
-    let count = make_whole(&mut value);
-    let Ok(more) = More::deserialize(&value) else { return Err(first) };
-    if let Some(root) = value.as_object_mut() {
-        root.remove("animations");
-        let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
-        for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
-            scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
-        }
+    if let Some(all) = leniently(&value) {
+        return Ok(all);
     }
-    let Ok(tree) = serde_json::from_value(value) else { return Err(first) };
-    if count > 0 {
-        let what = "whole numbers written with a decimal point".to_owned();
-        sink.remark(Kind::Repaired, file, "JSON", what, count);
-    }
-    Ok((tree, more))
+    make_whole(&mut value);
+    let all = leniently(&value).ok_or(first)?;
+    sink.repaired(file, "JSON", "whole numbers written with a decimal point");
+    Ok(all)
 }
 
-/// Makes integers of all whole numbers, which serve for both; returns how many.
-fn make_whole(value: &mut serde_json::Value) -> usize {
+/// Without animations in the tree, of which `gltf::json` has only those of nodes, and with empty lists in scenes, to
+/// which it denies being empty.
+fn leniently(value: &serde_json::Value) -> Option<(Root, More)> {
+    let more = More::deserialize(value).ok()?;
+    let mut value = value.clone();
+    let root = value.as_object_mut()?;
+    root.remove("animations");
+    let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
+    for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
+        scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
+    }
+    Some((serde_json::from_value(value).ok()?, more))
+}
+
+/// Makes integers of all whole numbers, which serve for both.
+fn make_whole(value: &mut serde_json::Value) {
     use serde_json::Value;
     match value {
-        Value::Number(number) => match number.as_f64() {
-            Some(x) if number.is_f64() && x.fract() == 0.0 && x.abs() < (1_u64 << 53) as f64 => {
+        Value::Number(number) => {
+            let whole = |x: &f64| x.fract() == 0.0 && x.abs() < (1_u64 << 53) as f64;
+            if let Some(x) = number.as_f64().filter(whole).filter(|_| number.is_f64()) {
                 *number = (x as i64).into();
-                1
             }
-            _ => 0,
-        },
-        Value::Array(list) => list.iter_mut().map(make_whole).sum(),
-        Value::Object(map) => map.values_mut().map(make_whole).sum(),
-        _ => 0,
+        }
+        Value::Array(list) => list.iter_mut().for_each(make_whole),
+        Value::Object(map) => map.values_mut().for_each(make_whole),
+        _ => {}
     }
 }
 

@@ -91,7 +91,8 @@ impl<'a> Textures<'a> {
             }
         }
         let (indices, pictures): (Vec<usize>, Vec<Picture<'_>>) = wanted.into_iter().unzip();
-        let texels = picture::decode_all(document.file, &pictures, sink);
+        let decoded = picture::decode_all(document.file, &pictures, sink).into_iter();
+        let texels: Vec<_> = decoded.map(|texels| texels.unwrap_or_else(picture::stand_in)).collect();
         Ok(Self { document, images: indices.into_iter().zip(texels).collect(), spawned: BTreeMap::new() })
     }
 

@@ -55,7 +55,7 @@ fn read_named(folder: &Folder, library: Option<&str>, own: &str) -> Result<Bytes
 pub(super) struct Textures {
     file: String,
     images: BTreeMap<String, Arc<Texels>>,
-    /// Names of those that could not be read.
+    /// Names of those that could not be had.
     missing: BTreeSet<String>,
     spawned: BTreeMap<Key, Entity>,
 }
@@ -86,12 +86,17 @@ impl Textures {
                 }
             }
         }
-        let unread = pictures.iter().filter(|(_, picture)| picture.bytes.is_err());
-        let missing = unread.map(|(name, _)| name.clone()).collect();
         let (names, pictures): (Vec<String>, Vec<Picture<'_>>) = pictures.into_iter().unzip();
         let texels = picture::decode_all(file, &pictures, sink);
-        let file = file.to_owned();
-        Self { file, images: names.into_iter().zip(texels).collect(), missing, spawned: BTreeMap::new() }
+        let mut missing = BTreeSet::new();
+        let mut images = BTreeMap::new();
+        for (name, texels) in names.into_iter().zip(texels) {
+            if texels.is_none() {
+                missing.insert(name.clone());
+            }
+            images.insert(name, texels.unwrap_or_else(picture::stand_in));
+        }
+        Self { file: file.to_owned(), images, missing, spawned: BTreeMap::new() }
     }
 
     /// Whether the material has such a statement, and its picture is there.

@@ -86,7 +86,8 @@ pub(super) fn spawn_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<Mate
             instead: picture::CHECKER,
         })
         .collect();
-    let texels = picture::decode_all(&settings.file, &pictures, sink);
+    let decoded = picture::decode_all(&settings.file, &pictures, sink).into_iter();
+    let texels = decoded.map(|texels| texels.unwrap_or_else(picture::stand_in));
     let images: BTreeMap<&str, Arc<Texels>> = names.into_iter().zip(texels).collect();
     let mut materials = Materials::default();
     for (name, table) in tables {

@@ -69,7 +69,7 @@ pub fn run(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
                     }
                     let wrong = with_threads(threads, || {
                         let tracer = (maker.make)(triangles);
-                        let pieces = rays.par_chunks(512).zip(expected.par_chunks(512));
+                        let pieces = rays.par_chunks(64).zip(expected.par_chunks(64));
                         pieces.map(|(rays, expected)| ask(tracer.as_ref(), rays).wrong(expected)).sum::<u64>()
                     });
                     let tried = if wrong.is_some() { rays.len() as u64 } else { 0 };

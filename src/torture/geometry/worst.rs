@@ -182,7 +182,7 @@ pub fn hits<T: Tracer>(
         .collect();
     let seen = expected.iter().flatten().count();
     let check = |(kernel, tracer): &(&str, T)| {
-        let pieces = rays.par_chunks(256).zip(expected.par_chunks(256));
+        let pieces = rays.par_chunks(15).zip(expected.par_chunks(15));
         let wrong = pieces.map(|(rays, expected)| ask(tracer, rays).wrong(expected)).sum();
         let tried = if seen > 0 { count as u64 } else { 0 };
         Check::none(format!("hits: {name}, {kernel}"), tried, "rays", wrong)

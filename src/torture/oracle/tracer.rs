@@ -119,7 +119,7 @@ pub struct Answers {
     pub blocked_alone: Vec<bool>,
 }
 
-/// Asks all four questions; batches with the first half of the rays in packets, the others mostly by twos.
+/// Asks all four questions; of batches of some hundred rays the first half in packets, all others mostly by twos.
 #[must_use]
 pub fn ask(tracer: &dyn Tracer, rays: &[Ray]) -> Answers {
     let order = half_alike(rays);
