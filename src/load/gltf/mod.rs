@@ -80,7 +80,8 @@ pub(super) fn load(
     let container = container::split(file, &bytes)?;
     let json = without_bom(container.json);
     check_head(file, json, sink)?;
-    let (tree, more) = parse_all(file, json, sink)?;
+    let tree = parse_tree(file, json)?;
+    let more: More = parse(file, json)?;
     sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
@@ -241,51 +242,22 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
     })
 }
 
-/// The whole tree. What fails is tried once more without what `gltf::json` knows less of than the format, and then with
-/// integers for what exporters without these write, `4.0`.
-fn parse_all(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(Root, More), LoadError> {
-    let first = match parse(file, json).and_then(|tree| Ok((tree, parse(file, json)?))) {
-        Ok(all) => return Ok(all),
+/// The whole tree; once more without what `gltf::json` knows less of than the format if it fails: animations, of
+/// which it has only those of nodes, and scenes, to which it denies being empty.
+fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
+    let first = match parse(file, json) {
+        Ok(tree) => return Ok(tree),
         Err(first) => first,
     };
     let mut value: serde_json::Value = parse(file, json)?;
-    if let Some(all) = leniently(&value) {
-        return Ok(all);
-    }
-    make_whole(&mut value);
-    let all = leniently(&value).ok_or(first)?;
-    sink.repaired(file, "JSON", "whole numbers written with a decimal point");
-    Ok(all)
-}
-
-/// Without animations in the tree, of which `gltf::json` has only those of nodes, and with empty lists in scenes, to
-/// which it denies being empty.
-fn leniently(value: &serde_json::Value) -> Option<(Root, More)> {
-    let more = More::deserialize(value).ok()?;
-    let mut value = value.clone();
-    let root = value.as_object_mut()?;
-    root.remove("animations");
-    let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
-    for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
-        scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
-    }
-    Some((serde_json::from_value(value).ok()?, more))
-}
-
-/// Makes integers of all whole numbers, which serve for both.
-fn make_whole(value: &mut serde_json::Value) {
-    use serde_json::Value;
-    match value {
-        Value::Number(number) => {
-            let whole = |x: &f64| x.fract() == 0.0 && x.abs() < (1_u64 << 53) as f64;
-            if let Some(x) = number.as_f64().filter(whole).filter(|_| number.is_f64()) {
-                *number = (x as i64).into();
-            }
+    if let Some(root) = value.as_object_mut() {
+        root.remove("animations");
+        let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
+        for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
+            scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
         }
-        Value::Array(list) => list.iter_mut().for_each(make_whole),
-        Value::Object(map) => map.values_mut().for_each(make_whole),
-        _ => {}
     }
+    serde_json::from_value(value).map_err(|_| first)
 }
 
 /// Refuses other versions and required extensions; warns of extensions that are merely used.
