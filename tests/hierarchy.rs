@@ -134,6 +134,38 @@ fn the_checker_finds_a_path_longer_than_a_traversal_stack() {
     assert!(matches!(chain(200), Err(Defect::TooDeep { .. })));
 }
 
+/// Triangles that lie anywhere, each with a box of its own, would need twice as many nodes.
+#[test]
+fn no_triangle_takes_more_than_72_bytes() {
+    let needles = |count| {
+        let mut rng = Rng(9);
+        let needle = |_| {
+            let (p, along) = (rng.vec(), rng.vec() * 0.2);
+            [p, p + along, p + along + rng.vec() * 1e-3]
+        };
+        (0..count).map(needle).collect::<Vec<_>>()
+    };
+    for (name, triangles) in [
+        ("dots", soup(50_000, 0.001, 5)),
+        ("soup", soup(50_000, 0.05, 6)),
+        ("dense", soup(100_000, 0.5, 7)),
+        ("needles", needles(200_000)),
+    ] {
+        let bytes = Blas::build(&triangles).bytes() as f64 / triangles.len() as f64;
+        assert!(bytes <= 72.0, "{name}: {bytes} bytes a triangle");
+        println!("{name}: {bytes:.1} bytes a triangle");
+    }
+    // Splitting them may take 2 MB whatever their number, and pays.
+    for few in [needles(10_000), soup(20_000, 0.5, 7)] {
+        let bytes = Blas::build(&few).bytes();
+        assert!(
+            (80 * few.len()..50 * few.len() + 2_000_000).contains(&bytes),
+            "{bytes} bytes for {}",
+            few.len()
+        );
+    }
+}
+
 #[test]
 fn the_build_is_the_same_for_any_number_of_threads() {
     let boxes = boxes(&soup(50_000, 0.01, 6));

@@ -12,6 +12,12 @@ use rayon::prelude::*;
 
 /// Cost of visiting a node; that of a leaf is [`leaf_cost`].
 const NODE_COST: f32 = 1.0;
+/// So many times more where nodes take too much memory, and again ...
+const DEARER: f32 = 1.5;
+/// ... up to this.
+const DEAREST_NODE: f32 = 10.0;
+/// Never too many: 16 kB.
+const FEW_NODES: usize = 64;
 
 /// Cost of testing the entries of a leaf.
 pub(super) fn leaf_cost(count: u32) -> f32 {
@@ -42,19 +48,30 @@ pub(super) struct Part {
 impl Part {
     /// Merges the binary `nodes`, at least one, and leaves to such of at most `max_leaf` ≤ 8 entries where that
     /// is cheaper.
-    pub fn new(nodes: &[Node], max_leaf: usize) -> Self {
-        let plans = plan(nodes, max_leaf, |node, area| area * leaf_cost(node.count));
-        let mut merge = Merge {
-            binary: nodes,
-            plans: &plans,
-            nodes: Vec::new(),
-            leaf: |first, count| Child::Leaf { first, count },
-        };
-        let child = merge.subtree();
-        let mut nodes = merge.nodes;
-        nodes.shrink_to_fit();
-        let root = Node { count: plans[0].count, ..merge.binary[0] };
-        Self { nodes, root, cost: plans[0].cost[0], child }
+    ///
+    /// Should wide nodes take more than `room` bytes for each entry, visiting one is taken to cost more, until they
+    /// do not: larger leaves become worth it.
+    pub fn new(nodes: &[Node], max_leaf: usize, room: f32) -> Self {
+        let mut node_cost = NODE_COST;
+        loop {
+            let plans = plan(nodes, max_leaf, node_cost, |node, area| area * leaf_cost(node.count));
+            let mut merge = Merge {
+                binary: nodes,
+                plans: &plans,
+                nodes: Vec::new(),
+                leaf: |first, count| Child::Leaf { first, count },
+            };
+            let child = merge.subtree();
+            let mut wide = merge.nodes;
+            let root = Node { count: plans[0].count, ..nodes[0] };
+            let too_many = wide.len() > FEW_NODES && size_of_val(&*wide) as f32 > room * root.count as f32;
+            if too_many && node_cost < DEAREST_NODE {
+                node_cost *= DEARER;
+                continue;
+            }
+            wide.shrink_to_fit();
+            return Self { nodes: wide, root, cost: plans[0].cost[0], child };
+        }
     }
 
     /// First entry and number of entries of all leaves.
@@ -88,7 +105,7 @@ pub(super) fn join(tree: Subtree<Part>, prims: Vec<u32>) -> WideBvh {
     collect(tree, 0, &mut binary, &mut parts);
     let bounds = Aabb { min: binary[0].min, max: binary[0].max };
     // Nodes above the parts, which are to them what leaves are to others.
-    let plans = plan(&binary, 0, |node, _| parts[node.first as usize].cost);
+    let plans = plan(&binary, 0, NODE_COST, |node, _| parts[node.first as usize].cost);
     let mut merge = Merge {
         binary: &binary,
         plans: &plans,
@@ -170,12 +187,12 @@ impl WideBvh {
         if bvh.nodes.is_empty() {
             return Self::default();
         }
-        join(Subtree::Done(Part::new(&bvh.nodes, max_leaf)), bvh.prims.clone())
+        join(Subtree::Done(Part::new(&bvh.nodes, max_leaf, f32::INFINITY)), bvh.prims.clone())
     }
 }
 
 /// For each binary node. `cost` is that of a leaf, given also its area.
-fn plan(nodes: &[Node], max_leaf: usize, cost: impl Fn(&Node, f32) -> f32) -> Vec<Plan> {
+fn plan(nodes: &[Node], max_leaf: usize, node_cost: f32, cost: impl Fn(&Node, f32) -> f32) -> Vec<Plan> {
     let empty = Plan { cost: [0.0; WIDTH - 1], left: [0; WIDTH - 1], count: 0 };
     let mut plans = vec![empty; nodes.len()];
     // Children come after their parents.
@@ -190,7 +207,7 @@ fn plan(nodes: &[Node], max_leaf: usize, cost: impl Fn(&Node, f32) -> f32) -> Ve
             let count = left.count + right.count;
             let mut plan = Plan { count, ..empty };
             let (cost, split) = best_split(left, right, WIDTH);
-            plan.cost[0] = area * NODE_COST + cost;
+            plan.cost[0] = area * node_cost + cost;
             plan.left[0] = split;
             if count as usize <= max_leaf && area * leaf_cost(count) <= plan.cost[0] {
                 plan.cost[0] = area * leaf_cost(count);

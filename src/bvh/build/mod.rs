@@ -51,6 +51,12 @@ pub const MAX_DEPTH: usize = SAH_LEVELS + 32;
 const MAX_LEAF: usize = 4;
 /// Long lists are worked at in pieces of this length, by all threads.
 const PIECE: usize = 1 << 14;
+/// Nodes and corners take no more for each triangle of a mesh ...
+const BYTES: f32 = 72.0;
+/// ... of which each entry of a leaf takes this, three corners and a number ...
+const BYTES_OF_ENTRY: f32 = 40.0;
+/// ... but where a small scene's slivers are split nodes have this for each entry in any case.
+const LEAST_ROOM: f32 = 10.0;
 
 impl Bvh {
     /// Builds over `boxes`, all finite and not empty, each in a leaf of its own. There may be none, or many
@@ -105,11 +111,17 @@ pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     }
     // The boxes are gone, and nodes only once there, before there are corners: so the most memory that is ever
     // needed is that of the boxes.
-    let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF));
+    let room = room(triangles.len(), prims.len());
+    let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF, room));
     let leaves = tree.parts().into_par_iter().map(Part::leaf_list).collect();
     let wide = merge::join(tree, order);
     let rows = leaves::rows(leaves, &wide.prims, triangles);
     (wide, rows)
+}
+
+/// Bytes of nodes for each entry of a leaf.
+fn room(triangles: usize, entries: usize) -> f32 {
+    (BYTES * triangles as f32 / entries as f32 - BYTES_OF_ENTRY).max(LEAST_ROOM)
 }
 
 /// Judged in double precision, where differences and products of f32 are exact or nearly so.
