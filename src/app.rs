@@ -259,6 +259,9 @@ pub fn trace_frame(
     // Not each time: it would count as a change of the film.
     if film.region() != budget.region {
         film.confine(budget.region);
+        // What was known of other pixels.
+        (stats.noise, stats.noise_samples) = (None, 0);
+        estimated.at = f64::NEG_INFINITY;
     }
     let mut rays = RayCounts::default();
     // Once for each reset: a preview that came anew each frame would leave no time for anything else.

@@ -7,7 +7,9 @@ use crate::image::{Display, ToneMap};
 use crate::load::{
     Card, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
 };
-use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform};
+use crate::scene::{
+    ActiveCamera, Aspect, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform,
+};
 use crate::sync::{Instructions, RenderOrigin};
 use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
@@ -107,10 +109,15 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let resolution = options.resolution.or(wishes.size.map(|size| size.to_array()));
     let mut options = LoadOptions { resolution, ..options.clone() };
     let (mut app, mut report) = App::open(source, &options, RenderSettings::default())?;
+    choose_camera(&mut app.world, &report, &source.name(), wishes)?;
     let file = &report.render;
     let default = RenderSettings::default();
     let settings = RenderSettings {
-        size: wishes.size.or(file.resolution.map(UVec2::from_array)).unwrap_or(default.size),
+        size: wishes.size.or(file.resolution.map(UVec2::from_array)).unwrap_or_else(|| {
+            let active = app.world.get_resource::<ActiveCamera>().map(|active| active.0);
+            let aspect = active.and_then(|camera| app.world.get::<Aspect>(camera));
+            aspect.map_or(default.size, |aspect| size_of_shape(aspect.0, default.size))
+        }),
         integrator: wishes.integrator.unwrap_or(match file.integrator {
             Some(SidecarIntegrator::Path) => Integrator::Path,
             Some(SidecarIntegrator::Direct) | None => default.integrator,
@@ -145,7 +152,6 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     if let Some(samples) = samples {
         app.world.resource_mut::<FrameBudget>().sample_target = samples;
     }
-    choose_camera(&mut app.world, &report, &source.name(), wishes)?;
     let load_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
@@ -153,13 +159,31 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     first_look::settle(&mut app, &mut report, &source.to_string(), exposure.is_none());
     let build_seconds = start.elapsed().as_secs_f64();
     let card = Card::of(&source.to_string(), &report).text();
-    app.world.insert_resource(LoadCard(card.into()));
+    app.world.insert_resource(LoadCard { text: card.into(), warnings: report.warnings().len() });
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
+}
+
+/// A size of this width over height with as many pixels as `usual`, but no higher than a screen.
+fn size_of_shape(aspect: f32, usual: UVec2) -> UVec2 {
+    const HIGHEST: f64 = 720.0;
+    // Beyond this the format means something else.
+    let aspect = f64::from(aspect.clamp(0.1, 10.0));
+    let usual = usual.as_dvec2();
+    if (aspect - usual.x / usual.y).abs() < 0.01 {
+        return usual.as_uvec2();
+    }
+    let height = (usual.element_product() / aspect).sqrt().min(HIGHEST).round();
+    UVec2::new((height * aspect).round() as u32, height as u32)
 }
 
 /// What `check` says of the scene in a world.
 #[derive(Resource, Clone, Debug)]
-pub struct LoadCard(pub Arc<str>);
+pub struct LoadCard {
+    /// All of it.
+    pub text: Arc<str>,
+    /// Lines about what is not as the files say.
+    pub warnings: usize,
+}
 
 /// Where the scene in a world comes from, to load or to speak of it again.
 #[derive(Resource, Clone, Debug)]

@@ -92,6 +92,16 @@ impl SceneSource {
     }
 }
 
+impl SceneSource {
+    /// Where its file lies, with a separator at its end; empty for what has no file or lies where the program runs.
+    #[must_use]
+    pub fn folder(&self) -> String {
+        let Self::File(path) = self else { return String::new() };
+        let folder = path.parent().map(|folder| folder.to_string_lossy()).unwrap_or_default();
+        if folder.is_empty() { String::new() } else { format!("{folder}{}", std::path::MAIN_SEPARATOR) }
+    }
+}
+
 impl fmt::Display for SceneSource {
     /// The path, or the name of the built-in scene.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -154,7 +164,13 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     let format = Format::of(&file, &bytes)?;
     let mut settings = Vec::new();
     if format == Format::Settings {
-        settings.push(Settings::parse(&file, folder.clone(), &bytes)?);
+        let own = Settings::parse(&file, folder.clone(), &bytes)?;
+        if own.is_of_a_scene() {
+            let problem = "there is none, so this is no scene but what was edited in one: open that, and this with \
+                           --scene-settings";
+            return Err(LoadError::broken(&file, "[[model]]", problem));
+        }
+        settings.push(own);
     }
     settings.extend(sidecar(source, format, options, sink)?);
     if let Some(edits) = &options.edits {

@@ -10,6 +10,10 @@ pub struct Camera {
     pub projection: Projection,
 }
 
+/// Width over height of the picture that a camera's author had in mind, above 0.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct Aspect(pub f32);
+
 /// How directions meet pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {

@@ -20,7 +20,7 @@ pub mod transform;
 
 pub use animation::{Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, play};
 pub use bounds::SceneBounds;
-pub use camera::{ActiveCamera, Camera, Lens, Projection};
+pub use camera::{ActiveCamera, Aspect, Camera, Lens, Projection};
 pub use deform::{Deform, Influences, Skin, Target, deform};
 pub use hidden::Hidden;
 pub use layers::{Anisotropy, Body, Clearcoat, Layers, Sheen, Transmission};

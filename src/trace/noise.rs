@@ -38,12 +38,12 @@ pub fn relative_noise(film: &Film) -> Option<f64> {
 /// error. (Where one has a samples and the other b, (A − B) √(ab) / (a + b).) Pixels that are dark in every sample count as exact.
 ///
 /// `None` before both halves have a sample, or when all is black. It knows nothing of light that no
-/// sample has seen yet.
+/// sample has seen yet. Of a film that is confined to a region it is that region's.
 #[must_use]
 pub fn estimate(film: &Film) -> Option<Noise> {
-    let size = film.size();
+    let [min, max] = part(film);
     let (picture, errors) = luminances(film)?;
-    let squares = squares(&errors, &picture, size)?;
+    let squares = squares(&errors, &picture, max - min)?;
     let (sum, fourth) = squares.iter().fold((0.0, 0.0), |(sum, fourth), x| (sum + x, fourth + x * x));
     let relative = (sum / squares.len() as f64).sqrt();
     // Of a squared normal error x, E x² = 3 (E x)²; the root halves a relative scatter.
@@ -51,15 +51,32 @@ pub fn estimate(film: &Film) -> Option<Noise> {
     Some(Noise { relative, doubt: relative * 1.96 * std::f64::consts::SQRT_2 * scatter })
 }
 
-/// Relative error of each pixel by the same estimate, rows from the top; 0 where both halves are black. Empty if
-/// the picture is not ready for it.
+/// Relative error of each pixel by the same estimate, rows from the top; 0 where both halves are black, and beside the region
+/// that the film is confined to. Empty if the picture is not ready for it.
 #[must_use]
 pub fn map(film: &Film) -> Vec<f32> {
-    let squares = luminances(film).and_then(|(picture, errors)| squares(&errors, &picture, film.size()));
-    squares.unwrap_or_default().into_iter().map(|x| x.sqrt() as f32).collect()
+    let [min, max] = part(film);
+    let squares = luminances(film).and_then(|(picture, errors)| squares(&errors, &picture, max - min));
+    let Some(squares) = squares else { return Vec::new() };
+    let (size, width) = (film.size(), (max - min).x as usize);
+    let mut map = vec![0.0; size.element_product() as usize];
+    let rows = map.chunks_exact_mut(size.x as usize).skip(min.y as usize);
+    for (row, squares) in rows.zip(squares.chunks_exact(width)) {
+        let own = row[min.x as usize..].iter_mut().zip(squares);
+        own.for_each(|(error, square)| *error = square.sqrt() as f32);
+    }
+    map
 }
 
-/// Of all pixels, and what stands for their errors; `None` before both halves of each have a sample.
+/// The pixels that are worked on: the film's region as far as it lies in the picture, or all.
+#[must_use]
+pub fn part(film: &Film) -> [UVec2; 2] {
+    let size = film.size();
+    let region = film.region().map(|[min, max]| [min.min(size), max.min(size)]);
+    region.filter(|[min, max]| max.cmpgt(*min).all()).unwrap_or([UVec2::ZERO, size])
+}
+
+/// Of the pixels of that part, and what stands for their errors; `None` before both halves of each have a sample.
 fn luminances(film: &Film) -> Option<(Vec<f64>, Vec<f64>)> {
     let brightness = |c: DVec3| f64::from(luminance(c.as_vec3()));
     let halves = |pixel: &Pixel| {
@@ -68,12 +85,13 @@ fn luminances(film: &Film) -> Option<(Vec<f64>, Vec<f64>)> {
         let all = in_a + in_b;
         Some(((a * in_a + b * in_b) / all, (a - b) * (in_a * in_b).sqrt() / all))
     };
-    let size = film.size();
+    let [min, max] = part(film);
+    let size = max - min;
     let (width, count) = (size.x as usize, size.element_product() as usize);
     let (mut picture, mut errors) = (vec![0.0; count], vec![0.0; count]);
-    let rows = picture.par_chunks_exact_mut(width).zip(errors.par_chunks_exact_mut(width)).zip(0..size.y);
+    let rows = picture.par_chunks_exact_mut(width).zip(errors.par_chunks_exact_mut(width)).zip(min.y..max.y);
     let is_ready = rows.map(|((picture, errors), y)| {
-        let mut places = picture.iter_mut().zip(errors).zip(film.row(y));
+        let mut places = picture.iter_mut().zip(errors).zip(film.row(y).skip(min.x as usize));
         places.all(|((luminance, error), pixel)| {
             halves(pixel).map(|found| (*luminance, *error) = found).is_some()
         })
@@ -134,6 +152,33 @@ fn means_around(values: &[f64], size: UVec2) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
+
+    /// Nobody waits for the rest of the picture.
+    #[test]
+    fn the_noise_of_a_region_is_known_although_nothing_is_known_of_the_rest() {
+        let size = UVec2::new(32, 24);
+        let mut film = Film::new(size, 0);
+        let region = [UVec2::new(8, 8), UVec2::new(20, 16)];
+        film.confine(Some(region));
+        assert_eq!((estimate(&film), map(&film)), (None, Vec::new()));
+        for tile in film.tiles_mut().iter_mut().filter(|tile| !tile.rests()) {
+            for pixel in tile.pixels_mut() {
+                pixel.add(0, Vec3::splat(1.1));
+                pixel.add(1, Vec3::splat(0.9));
+            }
+        }
+        // Halves of 1.1 and 0.9: an error of 0.1 beside 1 and a tenth of that.
+        let wanted = 0.1 / 1.01f64.sqrt();
+        assert!((estimate(&film).unwrap().relative - wanted).abs() < 1e-6);
+        let map = map(&film);
+        assert_eq!(map.len(), 32 * 24);
+        let is_known = |x: u32, y: u32| (map[(y * 32 + x) as usize] - wanted as f32).abs() < 1e-6;
+        let inside = |x: u32, y: u32| (8..20).contains(&x) && (8..16).contains(&y);
+        assert!((0..24).all(|y| (0..32).all(|x| is_known(x, y) == inside(x, y))));
+        film.confine(None);
+        assert_eq!(estimate(&film), None);
+    }
 
     #[test]
     fn means_are_those_of_the_pixels_around() {
@@ -175,7 +220,7 @@ mod tests {
         for tile in film.tiles_mut() {
             for pixel in tile.pixels_mut() {
                 for i in 0..16 {
-                    pixel.add(i, glam::Vec3::splat(10.0 + normal()));
+                    pixel.add(i, Vec3::splat(10.0 + normal()));
                 }
             }
         }

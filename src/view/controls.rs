@@ -11,6 +11,8 @@ use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
 use crate::shown::Shown;
 use crate::trace::{Film, Integrator, RenderSettings};
 use bevy_ecs::prelude::*;
+use std::fs::File;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 /// Whether refinement rests. The view still follows the camera.
@@ -24,6 +26,8 @@ pub enum Notice {
     Text(String),
     /// In the window and on standard output, to be pasted elsewhere.
     Print(String),
+    /// The same, with something to say before it in the window.
+    Saved(String, String),
 }
 
 /// Notices that nobody has seen yet.
@@ -79,11 +83,17 @@ pub fn change_display(
         let thirds = if press.shift { 3.0 } else { 1.0 };
         match press.tap {
             Tap::AutoExposure => match exposure_for(&film) {
-                Some(stops) => wanted.exposure = stops,
+                Some(stops) => {
+                    wanted.exposure = stops;
+                    notices.0.push(told_exposure(stops));
+                }
                 None => notices.0.push(Notice::Text("nothing bright to expose for".to_owned())),
             },
-            Tap::Brighter => wanted.exposure = step_exposure(wanted.exposure, thirds),
-            Tap::Darker => wanted.exposure = step_exposure(wanted.exposure, -thirds),
+            Tap::Brighter | Tap::Darker => {
+                let thirds = if press.tap == Tap::Brighter { thirds } else { -thirds };
+                wanted.exposure = step_exposure(wanted.exposure, thirds);
+                notices.0.push(told_exposure(wanted.exposure));
+            }
             Tap::ToneMap => {
                 wanted.tone_map = wanted.tone_map.stepped(press.shift);
                 notices.0.push(Notice::Text(format!("tone map: {}", tone_map_name(wanted.tone_map))));
@@ -92,6 +102,10 @@ pub fn change_display(
         }
     }
     display.set_if_neq(wanted);
+}
+
+fn told_exposure(stops: f32) -> Notice {
+    Notice::Text(format!("exposure: {stops:+.2} EV"))
 }
 
 /// `exposure` moved by `thirds` of a stop, on the grid of thirds: three steps are one stop exactly.
@@ -140,8 +154,13 @@ pub fn save_picture(
     }
     let stem = origin.map_or_else(|| "scene".to_owned(), |origin| origin.source.name());
     let name = |n: u32, ending: &str| PathBuf::from(format!("{stem}_{n}.{ending}"));
-    let free = |n: &u32| !name(*n, "exr").exists() && !name(*n, "png").exists();
-    let n = (1..u32::MAX).find(free).unwrap_or(u32::MAX);
+    // Looked for and taken in one: two windows cannot get the same number.
+    let take = |n: &u32| {
+        !name(*n, "png").exists()
+            && File::create_new(name(*n, "exr"))
+                .map_or_else(|e| e.kind() != ErrorKind::AlreadyExists, |_| true)
+    };
+    let n = (1..u32::MAX).find(take).unwrap_or(u32::MAX);
     let saved = ["exr", "png"].map(|ending| save(&name(n, ending), &film, &display));
     let said = match saved.into_iter().find_map(Result::err) {
         None => format!("saved {stem}_{n}.exr and .png"),

@@ -20,9 +20,10 @@ pub fn change_region(
     mut share: Local<usize>,
 ) {
     let mut wanted = budget.region;
-    // Pixels of another size of picture are others.
-    if input.resize.is_some_and(|size| size != settings.size) {
-        wanted = None;
+    // The same part of a picture of another size.
+    if let (Some([min, max]), Some(size)) = (wanted, input.resize.filter(|&size| size != settings.size)) {
+        let part = |at: UVec2| at.as_dvec2() / settings.size.as_dvec2();
+        wanted = region([part(min), part(max)], size);
     }
     for press in input.taps.iter().filter(|press| press.tap == Tap::Crop) {
         *share = if press.shift { (*share + 1) % SHARES.len() } else { *share };

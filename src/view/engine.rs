@@ -4,20 +4,20 @@ use super::controls::{Notice, Notices, Paused};
 use super::debug::CurrentLayer;
 use super::debug::layer::Layer;
 use super::input::{Command, Input};
-use super::instrument::{Instrument, Reference};
+use super::instrument::{Instrument, Reference, Seen};
 use super::keymap::Tap;
 use super::plain::Plain;
 use super::playing::Clock;
 use super::prepare::{prepare, status};
-use super::reload::{is_sky, load_again, open_other, set_sky};
+use super::reload::{self, load_again, open_other, set_sky};
 use super::sides::{Compared, Sides};
-use super::status::Status;
+use super::status::{Status, counted};
 use super::watch::{PAUSE, SceneWatch};
 use crate::app::{App, FrameBudget, FrameStats};
 use crate::image::Picture;
 use crate::image::compare::LinearImage;
 use crate::load::Watcher;
-use crate::open::SceneOrigin;
+use crate::open::{LoadCard, SceneOrigin};
 use crate::preview::Preview;
 use crate::shown::Shown;
 use crate::sync::Redone;
@@ -58,10 +58,20 @@ pub enum Wake {
     Plain(Tap, Picture),
     /// Something to show to the user.
     Notice(String),
-    /// Something to show, and to be pasted elsewhere.
-    Copy(String),
-    /// Another scene is shown now, of this name.
-    Opened(String),
+    /// Something to be pasted elsewhere, and what to say before it.
+    Copy {
+        /// Nothing, or with its end of a sentence.
+        said: String,
+        /// To be pasted.
+        text: String,
+    },
+    /// Another scene is shown now.
+    Opened {
+        /// Its name.
+        name: String,
+        /// Where its file lies, with a separator at its end; empty if it has none.
+        folder: String,
+    },
 }
 
 /// The latest that the engine made; what the window has not taken is overwritten.
@@ -116,8 +126,13 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         // A bug in a frame must end in a message, not in a window that never changes again.
         let outcome = catch_unwind(AssertUnwindSafe(|| match open(self.watcher(&self.scene)) {
             Ok(mut app) => {
-                let viewpoint = *app.world.resource::<Viewpoint>();
-                let reference = self.reference.take().map(|image| Reference::new(image, viewpoint));
+                let wrong = told_wrong(&app);
+                if !wrong.is_empty() {
+                    let name = app.world.get_resource::<SceneOrigin>().map(|origin| origin.source.name());
+                    (self.wake)(Wake::Notice(format!("{}{wrong}", name.unwrap_or_default())));
+                }
+                let (viewpoint, seen) = (*app.world.resource::<Viewpoint>(), Seen::of(&app.world));
+                let reference = self.reference.take().map(|image| Reference::new(image, viewpoint, seen));
                 app.world.insert_resource(Instrument::against(reference));
                 self.run_frames(app);
             }
@@ -248,21 +263,26 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         let again = path.is_none();
         let name =
             path.as_ref().map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned());
+        let is_sky = path.as_deref().is_some_and(reload::is_sky);
         let watcher = self.watcher(name.as_deref().unwrap_or("the scene again"));
         let loaded = match path {
-            Some(path) if is_sky(&path) => set_sky(app, path, watcher),
+            Some(path) if is_sky => set_sky(app, path, watcher),
             Some(path) => open_other(app, &path, watcher),
             None => load_again(app, watcher),
         };
         lock(&self.published).loading = None;
         match loaded {
             Ok(other) => {
-                let name =
+                let scene =
                     other.world.get_resource::<SceneOrigin>().map_or_else(String::new, |o| o.source.name());
                 let (verb, seconds) =
                     (if again { "reloaded" } else { "opened" }, start.elapsed().as_secs_f64());
-                (self.wake)(Wake::Notice(format!("{verb} {name} in {seconds:.2} s")));
-                (self.wake)(Wake::Opened(name));
+                let what = if is_sky { name.as_ref().unwrap_or(&scene) } else { &scene };
+                let wrong = told_wrong(&other);
+                (self.wake)(Wake::Notice(format!("{verb} {what} in {seconds:.2} s{wrong}")));
+                let folder =
+                    other.world.get_resource::<SceneOrigin>().map_or_else(String::new, |o| o.source.folder());
+                (self.wake)(Wake::Opened { name: scene, folder });
                 Some(other)
             }
             Err(why) => {
@@ -354,10 +374,24 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                     use std::io::Write;
                     // Whoever closed standard output does not want to read it.
                     let _ = writeln!(std::io::stdout(), "{text}");
-                    Wake::Copy(text)
+                    Wake::Copy { said: String::new(), text }
+                }
+                Notice::Saved(said, text) => {
+                    use std::io::Write;
+                    let _ = writeln!(std::io::stdout(), "{text}");
+                    Wake::Copy { said, text }
                 }
             });
         }
+    }
+}
+
+/// How much of the scene is not as its files say; nothing if all is.
+fn told_wrong(app: &App) -> String {
+    let card = app.world.get_resource::<LoadCard>();
+    match card.map_or(0, |card| card.warnings) {
+        0 => String::new(),
+        count => format!(": {} loading had to deal with, see the report (L)", counted(count, "thing")),
     }
 }
 

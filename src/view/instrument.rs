@@ -1,12 +1,14 @@
 //! The error instrument: how the noise falls, when it will have fallen, and the true error where it is known.
 
 use super::controls::{Notice, Notices};
+use super::edit::Editor;
 use crate::app::FrameStats;
 use crate::image::compare::LinearImage;
+use crate::scene::{Filter, Playing};
 use crate::sync::Redone;
 use crate::trace::convergence::{Convergence, PowerLaw};
-use crate::trace::noise::relative_error;
-use crate::trace::{Film, RenderSettings, Viewpoint};
+use crate::trace::noise::{part, relative_error};
+use crate::trace::{Film, Integrator, RenderSettings, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::UVec2;
 use std::sync::Arc;
@@ -55,28 +57,67 @@ pub struct Reference {
     pub image: LinearImage,
     truth: Vec<f64>,
     viewpoint: Viewpoint,
+    seen: Seen,
     /// Whether it was said that the picture is of another size.
     said: bool,
 }
 
+/// What beside the view makes the picture another.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seen {
+    edits: String,
+    integrator: Integrator,
+    max_depth: u32,
+    filter: Option<Filter>,
+    time: Option<f64>,
+}
+
+impl Seen {
+    /// As it is now.
+    #[must_use]
+    pub fn now(editor: Option<&Editor>, settings: &RenderSettings, playing: Option<&Playing>) -> Self {
+        let &RenderSettings { integrator, max_depth, filter, .. } = settings;
+        let edits = editor.map_or_else(String::new, |editor| editor.written().to_owned());
+        Self { edits, integrator, max_depth, filter, time: playing.and_then(|playing| playing.time) }
+    }
+
+    /// Of this world.
+    #[must_use]
+    pub fn of(world: &World) -> Self {
+        Self::now(world.get_resource(), world.resource(), world.get_resource())
+    }
+}
+
 impl Reference {
-    /// Of what is seen from `viewpoint`: where the window opens.
+    /// Of what is seen from `viewpoint` of what is `seen`: where the window opens.
     #[must_use]
-    pub fn new(image: LinearImage, viewpoint: Viewpoint) -> Self {
-        Self { truth: image.luminances(), image, viewpoint, said: false }
+    pub fn new(image: LinearImage, viewpoint: Viewpoint, seen: Seen) -> Self {
+        Self { truth: image.luminances(), image, viewpoint, seen, said: false }
     }
 
-    /// Whether it is of this view, in this size.
+    /// Why it is not of this picture; `None` if it is.
     #[must_use]
-    pub fn is_of(&self, viewpoint: &Viewpoint, size: UVec2) -> bool {
-        self.viewpoint == *viewpoint && self.image.size == size
+    pub fn differs(&self, viewpoint: &Viewpoint, seen: &Seen, size: UVec2) -> Option<&'static str> {
+        match () {
+            () if self.image.size != size => Some("the reference has another size: the picture"),
+            () if self.viewpoint != *viewpoint => Some("the reference is of another view: the picture"),
+            () if self.seen != *seen => Some("the reference is of the unedited scene: the picture"),
+            () => None,
+        }
     }
 
-    /// Relative error of `film`, if it is of the same view and size.
-    fn error(&self, film: &Film, viewpoint: &Viewpoint) -> Option<f64> {
-        self.is_of(viewpoint, film.size())
-            .then(|| relative_error(&LinearImage::of(film).luminances(), &self.truth, film.size()))
-            .flatten()
+    /// Relative error of `film`, if it is of the same; within the film's region, if it has one.
+    fn error(&self, film: &Film, viewpoint: &Viewpoint, seen: &Seen) -> Option<f64> {
+        if self.differs(viewpoint, seen, film.size()).is_some() {
+            return None;
+        }
+        let [min, max] = part(film);
+        let (stride, width) = (film.size().x as usize, (max - min).x as usize);
+        let within = |all: &[f64]| -> Vec<f64> {
+            let rows = all.chunks_exact(stride).skip(min.y as usize).take((max - min).y as usize);
+            rows.flat_map(|row| row.iter().skip(min.x as usize).take(width)).copied().collect()
+        };
+        relative_error(&within(&LinearImage::of(film).luminances()), &within(&self.truth), max - min)
     }
 
     /// Says once that a picture of this size cannot be measured.
@@ -102,6 +143,7 @@ pub struct Instrument {
     pub reference: Option<Reference>,
     convergence: Convergence,
     resets: u64,
+    region: Option<[UVec2; 2]>,
     start_seconds: f64,
     noted: u32,
 }
@@ -123,7 +165,8 @@ impl Instrument {
 /// Fewer looks than this are no curve to compare with: flying would leave nothing else.
 const WORTH_KEEPING: usize = 4;
 /// Round noise levels that one wants to reach.
-const GOALS: [f64; 9] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001];
+const GOALS: [f64; 15] =
+    [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5];
 
 /// Notes the noise whenever it has been estimated anew.
 pub fn note_noise(
@@ -133,11 +176,12 @@ pub fn note_noise(
     film: Res<Film>,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
+    (editor, playing): (Option<Res<Editor>>, Option<Res<Playing>>),
     mut notices: ResMut<Notices>,
 ) {
     let instrument = instrument.bypass_change_detection();
-    if instrument.resets != redone.resets {
-        instrument.resets = redone.resets;
+    if (instrument.resets, instrument.region) != (redone.resets, film.region()) {
+        (instrument.resets, instrument.region) = (redone.resets, film.region());
         instrument.start_seconds = stats.trace_seconds;
         instrument.noted = 0;
         instrument.convergence = Convergence::default();
@@ -155,7 +199,9 @@ pub fn note_noise(
     instrument.noted = stats.noise_samples;
     let seconds = (stats.trace_seconds - instrument.start_seconds).max(1e-6);
     let samples = stats.samples_per_pixel;
-    let error = instrument.reference.as_ref().and_then(|reference| reference.error(&film, &viewpoint));
+    let seen = || Seen::now(editor.as_deref(), &settings, playing.as_deref());
+    let reference = instrument.reference.as_ref();
+    let error = reference.and_then(|reference| reference.error(&film, &viewpoint, &seen()));
     notices.0.extend(instrument.reference.as_mut().and_then(|reference| reference.complain(film.size())));
     instrument.convergence.note(f64::from(stats.noise_samples), noise);
     let law = instrument.convergence.law();
@@ -239,7 +285,9 @@ mod tests {
     fn the_true_error_is_told_only_of_the_view_it_is_of() {
         let mut world = world();
         let image = LinearImage { size: UVec2::ONE, pixels: vec![glam::Vec3::splat(2.0)] };
-        world.resource_mut::<Instrument>().reference = Some(Reference::new(image, Viewpoint::default()));
+        let seen = Seen::of(&world);
+        world.resource_mut::<Instrument>().reference =
+            Some(Reference::new(image, Viewpoint::default(), seen));
         let mut film = Film::new(UVec2::ONE, 0);
         film.tiles_mut()[0].pixels_mut()[0].add(0, glam::Vec3::splat(2.2));
         world.insert_resource(film);
@@ -259,12 +307,21 @@ mod tests {
         world.resource_mut::<Redone>().resets += 1;
         refine(&mut world, 2);
         assert_eq!(error(&world), None);
+        // The same view of something else.
+        world.insert_resource(Viewpoint::default());
+        world.resource_mut::<RenderSettings>().max_depth = 1;
+        world.resource_mut::<Redone>().resets += 1;
+        refine(&mut world, 2);
+        assert_eq!(error(&world), None);
     }
+
     #[test]
     fn a_reference_of_another_size_is_told_once() {
         let mut world = world();
         let image = LinearImage { size: UVec2::new(2, 1), pixels: vec![glam::Vec3::ONE; 2] };
-        world.resource_mut::<Instrument>().reference = Some(Reference::new(image, Viewpoint::default()));
+        let seen = Seen::of(&world);
+        world.resource_mut::<Instrument>().reference =
+            Some(Reference::new(image, Viewpoint::default(), seen));
         refine(&mut world, 16);
         let said = &world.resource::<Notices>().0;
         assert_eq!(said.len(), 1, "{said:?}");

@@ -42,29 +42,53 @@ impl Viewer {
             return;
         };
         let pressed = event.state == ElementState::Pressed;
-        if pressed && let Some(prompt) = &mut self.ui.prompt {
-            match prompt.key(code, event.text.as_deref()) {
-                Typed::On => {}
-                Typed::Nothing => self.ui.prompt = None,
-                Typed::Open(path) => {
-                    self.ui.prompt = None;
-                    self.send(Command::Open(path));
-                }
-            }
-            return self.redraw();
-        }
-        if pressed && self.ui.takes_text() {
-            self.ui.key(code, event.text.as_deref());
+        let types = pressed && (self.ui.prompt.is_some() || self.ui.takes_text());
+        if types && !self.is_for_the_window(code) {
+            self.type_key(code, event.text.as_deref());
             return self.redraw();
         }
         let modified = self.held[Hold::Control as usize] || self.held[Hold::Fast as usize];
         if let (Key::Character(text), false) = (&event.logical_key, modified) {
             self.letters.learn(code, text);
         }
-        if !event.repeat {
-            self.record(Event::Key(code, pressed));
+        // What went down while something was typed is not held.
+        if !event.repeat && (pressed || self.keys.0.contains_key(&code)) {
+            self.record_cursor();
+            self.record(&Event::Key(code, pressed));
         }
         self.key_moved(event_loop, code, pressed, event.repeat, is_synthetic);
+    }
+
+    /// Whether a key means the same while something is typed: those that modify others, and the end.
+    fn is_for_the_window(&self, code: KeyCode) -> bool {
+        let [control, shift] = [Hold::Control, Hold::Fast].map(|hold| self.held[hold as usize]);
+        let entry = self.options.keys.lookup(code, control, shift);
+        entry.is_some_and(|entry| {
+            // A letter that is bound to it is typed all the same.
+            is_modifier(entry.action) || control && entry.action == Action::Tap(Tap::Quit)
+        })
+    }
+
+    /// A key for the line that asks for a file, or for a card.
+    fn type_key(&mut self, code: KeyCode, text: Option<&str>) {
+        let control = self.held[Hold::Control as usize];
+        let pasted = if control && code == KeyCode::KeyV { self.pasted() } else { None };
+        let Some(prompt) = &mut self.ui.prompt else {
+            return match pasted {
+                Some(text) => self.ui.paste(text),
+                None => self.ui.key(code, text, control),
+            };
+        };
+        let text = pasted.as_deref().or(text.filter(|_| !control));
+        match prompt.key(code, text) {
+            Typed::On => {}
+            Typed::Nothing => self.ui.prompt = None,
+            Typed::Open(path) => {
+                self.ui.prompt = None;
+                self.record(&Event::Open(path.clone()));
+                self.send(Command::Open(path));
+            }
+        }
     }
 
     /// A key went down or up, or is down for long.
@@ -111,7 +135,7 @@ impl Viewer {
             Tap::Graph => self.ui.graph = !self.ui.graph,
             Tap::Help => self.ui.help.turn(),
             Tap::Report => self.ui.report = !self.ui.report,
-            Tap::Open => self.ui.prompt = Some(Prompt::new("")),
+            Tap::Open => self.ui.prompt = Some(Prompt::new(&self.options.folder)),
             Tap::Escape => self.escape(),
             Tap::Split => {
                 self.split = self.cursor_in_picture().x;

@@ -50,8 +50,12 @@ use winit::event_loop::{EventLoop, EventLoopBuilder};
 pub struct ViewOptions {
     /// First words of the window's title.
     pub title: String,
-    /// Size of the picture when the window opens, physical pixels.
+    /// Size of the picture when the window opens, physical pixels, or ...
     pub size: UVec2,
+    /// ... points of the display, if nobody asked for that size.
+    pub in_points: bool,
+    /// Where to look for other scenes first, with a separator at its end.
+    pub folder: String,
     /// Name of the scene: screenshots are called `{screenshot_stem}_{n}.png`.
     pub screenshot_stem: String,
     /// A picture to measure the true error by, of the view that the window opens with.

@@ -1,19 +1,20 @@
 //! What a pixel's colour stands for: light, or something about how it was found.
 
 use super::controls::{Notice, Notices};
+use super::edit::Editor;
 use super::engine::Pending;
 use super::input::Input;
-use super::instrument::Instrument;
+use super::instrument::{Instrument, Seen};
 use super::keymap::Tap;
 use crate::app::FrameBudget;
 use crate::image::compare::LinearImage;
 use crate::image::{Display, Picture};
 use crate::report::false_color::ErrorScale;
-use crate::scene::SceneBounds;
 use crate::scene::color::{luminance, srgb_from_linear};
+use crate::scene::{Playing, SceneBounds};
 use crate::sync::{Redone, Traceable};
 use crate::trace::first::{Cost, FirstSurface, Grid, costs, first_surfaces};
-use crate::trace::{Film, Viewpoint, noise};
+use crate::trace::{Film, RenderSettings, Viewpoint, noise};
 use bevy_ecs::prelude::*;
 use glam::{UVec2, Vec3};
 use std::sync::atomic::Ordering;
@@ -118,18 +119,29 @@ pub fn choose_pixel_view(
     view.set_if_neq(wanted);
 }
 
+/// Why nobody knows the error of what is seen, if that is wanted.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unknown(Option<&'static str>);
+
 /// Light is developed if it is wanted, or if nobody knows the error of what is seen.
 pub fn choose_developed(
-    view: Res<PixelView>,
-    instrument: Res<Instrument>,
-    viewpoint: Res<Viewpoint>,
+    (view, instrument): (Res<PixelView>, Res<Instrument>),
+    (viewpoint, settings): (Res<Viewpoint>, Res<RenderSettings>),
+    (editor, playing): (Option<Res<Editor>>, Option<Res<Playing>>),
     film: Res<Film>,
+    mut unknown: ResMut<Unknown>,
     mut budget: ResMut<FrameBudget>,
     mut display: ResMut<Display>,
 ) {
-    let is_known =
-        instrument.reference.as_ref().is_some_and(|reference| reference.is_of(&viewpoint, film.size()));
-    let develop = *view == PixelView::Beauty || *view == PixelView::Error && !is_known;
+    *unknown = Unknown(None);
+    if *view == PixelView::Error {
+        let seen = Seen::now(editor.as_deref(), &settings, playing.as_deref());
+        unknown.0 = match &instrument.reference {
+            Some(reference) => reference.differs(&viewpoint, &seen, film.size()),
+            None => Some("there is no reference: the picture"),
+        };
+    }
+    let develop = *view == PixelView::Beauty || unknown.0.is_some();
     if budget.develop != develop {
         budget.develop = develop;
         // The picture is to be developed again.
@@ -177,7 +189,7 @@ pub struct DepthWanted(pub bool);
 
 /// Makes the picture of anything but light.
 pub fn develop_pixel_view(
-    (view, budget): (Res<PixelView>, Res<FrameBudget>),
+    (view, budget, unknown): (Res<PixelView>, Res<FrameBudget>, Res<Unknown>),
     film: Res<Film>,
     first: Res<FirstHits>,
     bounds: Option<Res<SceneBounds>>,
@@ -186,8 +198,7 @@ pub fn develop_pixel_view(
     mut picture: ResMut<Picture>,
 ) {
     if budget.develop {
-        let unknown = Legend { title: "no reference of this view: the picture", range: None };
-        legend.set_if_neq(CurrentLegend((*view == PixelView::Error).then_some(unknown)));
+        legend.set_if_neq(CurrentLegend(unknown.0.map(|title| Legend { title, range: None })));
         return;
     }
     if !(view.is_changed() || film.is_changed() || first.is_changed()) {

@@ -20,6 +20,11 @@ const CLICK: f64 = 4.0;
 impl Viewer {
     /// A button went down or up.
     pub(super) fn button(&mut self, button: MouseButton, down: bool) {
+        if down && !self.notice.is_empty() {
+            // It has been read, or is in the way.
+            self.notice.clear();
+            self.redraw();
+        }
         if self.ui.button(button, down) {
             self.redraw();
             // What began beside the cards ends wherever the button is let go.
@@ -43,14 +48,15 @@ impl Viewer {
             let drawn = self.drawn_region();
             self.end_drag();
             if let Some(corners) = drawn {
+                self.record(&Event::Region(corners));
                 self.send(Command::Region(corners));
                 return self.redraw();
             }
             let way = DVec2::new(self.cursor.x - start.x, self.cursor.y - start.y);
             if drag == Drag::Orbit && !self.dragged && way.length() < CLICK {
-                let shift = self.held[Hold::Fast as usize];
-                let press = Press { tap: Tap::Click, shift, cursor: self.cursor_in_picture() };
-                self.send(Command::Tap { press, at: Instant::now() });
+                self.record_cursor();
+                self.record(&Event::Click);
+                self.click();
             }
         }
     }
@@ -138,7 +144,7 @@ impl Viewer {
     }
 
     fn drag_by(&mut self, drag: Drag, pixels: DVec2) {
-        self.record(Event::Drag(drag, pixels.x, pixels.y));
+        self.record(&Event::Drag(drag, pixels.x, pixels.y));
         self.send(Command::Drag { drag, pixels, at: Instant::now() });
     }
 
@@ -155,16 +161,42 @@ impl Viewer {
                     self.send(Command::Drag { drag, pixels: DVec2::new(x, y), at: Instant::now() });
                 }
                 Event::Wheel(notches) => self.turn_wheel(notches),
+                Event::At(place) => self.put_cursor(place),
+                Event::Click => self.click(),
+                Event::Region(corners) => self.send(Command::Region(corners)),
+                Event::Open(path) => self.send(Command::Open(path)),
                 Event::Quit => event_loop.exit(),
             }
         }
         self.due.replay = self.options.replay.as_ref().and_then(Replay::next);
     }
 
-    pub(super) fn record(&mut self, event: Event) {
+    pub(super) fn record(&mut self, event: &Event) {
         if let Some(recorder) = &mut self.options.record {
             recorder.note(event);
         }
+    }
+
+    /// Before something that asks where the cursor is.
+    pub(super) fn record_cursor(&mut self) {
+        let at = self.cursor_in_picture();
+        if self.options.record.is_some() && self.recorded_cursor != Some(at) {
+            self.recorded_cursor = Some(at);
+            self.record(&Event::At(at));
+        }
+    }
+
+    /// As if the user had moved it.
+    fn put_cursor(&mut self, place: DVec2) {
+        let Some(screen) = &self.screen else { return };
+        let at = place * screen.size().as_dvec2();
+        self.cursor_moved(PhysicalPosition::new(at.x, at.y));
+    }
+
+    fn click(&self) {
+        let shift = self.held[Hold::Fast as usize];
+        let press = Press { tap: Tap::Click, shift, cursor: self.cursor_in_picture() };
+        self.send(Command::Tap { press, at: Instant::now() });
     }
 
     pub(super) fn wheel(&mut self, delta: MouseScrollDelta) {
@@ -172,7 +204,10 @@ impl Viewer {
             MouseScrollDelta::LineDelta(_, y) => f64::from(y),
             MouseScrollDelta::PixelDelta(p) => p.y / PIXELS_PER_NOTCH,
         };
-        self.record(Event::Wheel(notches));
+        if self.ui.wheel(notches) {
+            return self.redraw();
+        }
+        self.record(&Event::Wheel(notches));
         self.turn_wheel(notches);
     }
 

@@ -16,7 +16,7 @@ use super::input::Input;
 use super::instrument::{Instrument, note_noise};
 use super::orbit::{Navigation, change_navigation, focus, orbit_camera};
 use super::pixel_view::{
-    CurrentLegend, DepthWanted, FirstHits, PixelView, choose_developed, choose_pixel_view,
+    CurrentLegend, DepthWanted, FirstHits, PixelView, Unknown, choose_developed, choose_pixel_view,
     develop_pixel_view, refine_first_hits,
 };
 use super::plain::{Plain, develop_plain};
@@ -71,6 +71,7 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     app.world.init_resource::<Pending>();
     app.world.init_resource::<PixelView>();
     app.world.init_resource::<CurrentLegend>();
+    app.world.init_resource::<Unknown>();
     app.world.init_resource::<DepthWanted>();
     app.world.init_resource::<FirstHits>();
     app.world.init_resource::<Debug>();
@@ -143,7 +144,7 @@ pub fn status(app: &App) -> Status {
             let size = max - min;
             [min.x, min.y, size.x, size.y]
         }),
-        card: world.get_resource::<LoadCard>().map_or_else(|| Arc::from(""), |card| Arc::clone(&card.0)),
+        card: world.get_resource::<LoadCard>().map_or_else(|| Arc::from(""), |card| Arc::clone(&card.text)),
         machine: machine(world),
         resets: world.resource::<Redone>().resets,
         dropped: stats.dropped,

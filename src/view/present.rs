@@ -248,7 +248,8 @@ impl Viewer {
         };
         let stem = self.options.screenshot_stem.clone();
         // Another picture, or parts of two, cannot be made again from what makes this one.
-        let is_other = with_hud && plain.is_none() && self.other().is_some();
+        let is_other = with_hud && plain.is_none() && self.other().is_some()
+            || self.status.as_ref().is_some_and(|status| status.legend.is_some());
         let recipe = self.status.as_ref().filter(|_| !is_other).map(|status| status.recipe.clone());
         let proxy = self.proxy.clone();
         let writer = std::thread::spawn(move || {

@@ -26,11 +26,16 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// Why it cannot be shown; `app` is as it was then.
 pub fn open_other(app: &App, path: &Path, watcher: Watcher) -> Result<App, String> {
-    let source = SceneSource::File(path.to_path_buf());
+    let source = SceneSource::parse(&path.to_string_lossy()).map_err(|error| error.to_string())?;
     let settings = app.world.resource::<RenderSettings>();
     let wishes = Wishes {
         size: Some(settings.size),
         integrator: Some(settings.integrator),
+        max_depth: Some(settings.max_depth),
+        seed: Some(settings.seed),
+        sampling: Some(settings.sampling),
+        filter: settings.filter,
+        tone_map: Some(app.world.resource::<Display>().tone_map),
         isa: Some(app.world.resource::<Instructions>().0),
         ..Wishes::default()
     };

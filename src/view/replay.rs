@@ -1,19 +1,22 @@
 //! What a user did, as a text file: written while it happens, and done again later.
 //!
 //! A line an event: seconds since the start, then `down KEY`, `up KEY` (names as in the keys file),
-//! `drag look|orbit|pan X Y` (mouse pixels), `wheel NOTCHES` or `quit`. `#` begins a comment.
+//! `drag look|orbit|pan X Y` (mouse pixels), `wheel NOTCHES`, `at X Y` (where the cursor is, in parts of the window),
+//! `click`, `region X Y X Y` (a rectangle, in such parts), `open FILE` or `quit`. `#` begins a comment.
+//! Numbers that are changed on a card are not in it.
 
 use super::chord::Chord;
 use super::input::Drag;
+use glam::DVec2;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use winit::keyboard::KeyCode;
 
 /// Something that a user did.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A key went down or up.
     Key(KeyCode, bool),
@@ -21,6 +24,14 @@ pub enum Event {
     Drag(Drag, f64, f64),
     /// The wheel turned.
     Wheel(f64),
+    /// The cursor is here, from the upper left corner at 0 to the lower right one at 1.
+    At(DVec2),
+    /// A click there.
+    Click,
+    /// A rectangle was drawn between these places.
+    Region([DVec2; 2]),
+    /// A file was opened.
+    Open(PathBuf),
     /// The end.
     Quit,
 }
@@ -44,16 +55,30 @@ impl Event {
                 Ok(Self::Drag(drag, number(x)?, number(y)?))
             }
             ["wheel", notches] => Ok(Self::Wheel(number(notches)?)),
+            ["at", x, y] => Ok(Self::At(DVec2::new(number(x)?, number(y)?))),
+            ["click"] => Ok(Self::Click),
+            ["region", a, b, c, d] => {
+                let place = |x, y| Ok::<_, String>(DVec2::new(number(x)?, number(y)?));
+                Ok(Self::Region([place(a, b)?, place(c, d)?]))
+            }
+            ["open", ref file @ ..] if !file.is_empty() => Ok(Self::Open(PathBuf::from(file.join(" ")))),
             ["quit"] => Ok(Self::Quit),
-            _ => Err(format!("\"{}\" is no event: down, up, drag, wheel or quit", words.join(" "))),
+            _ => Err(format!(
+                "\"{}\" is no event: down, up, drag, wheel, at, click, region, open or quit",
+                words.join(" ")
+            )),
         }
     }
 
-    fn text(self) -> String {
+    fn text(&self) -> String {
         match self {
-            Self::Key(code, down) => format!("{} {code:?}", if down { "down" } else { "up" }),
+            Self::Key(code, down) => format!("{} {code:?}", if *down { "down" } else { "up" }),
             Self::Drag(drag, x, y) => format!("drag {} {x} {y}", format!("{drag:?}").to_lowercase()),
             Self::Wheel(notches) => format!("wheel {notches}"),
+            Self::At(place) => format!("at {:.5} {:.5}", place.x, place.y),
+            Self::Click => "click".to_owned(),
+            Self::Region([a, b]) => format!("region {:.5} {:.5} {:.5} {:.5}", a.x, a.y, b.x, b.y),
+            Self::Open(path) => format!("open {}", path.display()),
             Self::Quit => "quit".to_owned(),
         }
     }
@@ -100,7 +125,7 @@ impl Replay {
         let rest = &self.events[self.done..];
         let count = rest.iter().take_while(|(at, _)| start + *at <= now).count();
         self.done += count;
-        rest[..count].iter().map(|(_, event)| *event).collect()
+        rest[..count].iter().map(|(_, event)| event.clone()).collect()
     }
 
     /// When the next one comes.
@@ -133,7 +158,7 @@ impl Recorder {
     }
 
     /// Notes that `event` happens now.
-    pub fn note(&mut self, event: Event) {
+    pub fn note(&mut self, event: &Event) {
         let mut line = String::new();
         let seconds = self.start.map_or(0.0, |start| start.elapsed().as_secs_f64());
         let _ = writeln!(line, "{seconds:.4} {}", event.text());
@@ -154,11 +179,15 @@ mod tests {
             Event::Key(KeyCode::ArrowLeft, false),
             Event::Drag(Drag::Orbit, -1.5, 2.0),
             Event::Wheel(-1.0),
+            Event::At(DVec2::new(0.25, 0.5)),
+            Event::Click,
+            Event::Region([DVec2::ZERO, DVec2::new(0.5, 0.75)]),
+            Event::Open(PathBuf::from("two words.glb")),
             Event::Quit,
         ];
         let mut recorder = Recorder::create(&path).unwrap();
         recorder.begin();
-        events.into_iter().for_each(|event| recorder.note(event));
+        events.iter().for_each(|event| recorder.note(event));
         let mut replay = Replay::open(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
         let now = Instant::now();

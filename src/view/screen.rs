@@ -8,7 +8,7 @@ use pixels::{Error, Pixels, PixelsBuilder, SurfaceTexture};
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use winit::dpi::PhysicalSize;
+use winit::dpi::{LogicalSize, PhysicalSize, Size};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::{Fullscreen, Window};
 
@@ -40,11 +40,19 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Opens a window with `size` physical pixels inside, if the desktop allows.
-    pub fn open(event_loop: &ActiveEventLoop, title: &str, size: UVec2) -> Result<Self, String> {
-        let attributes = Window::default_attributes()
-            .with_title(title)
-            .with_inner_size(PhysicalSize::new(size.x.max(1), size.y.max(1)));
+    /// Opens a window with `size` physical pixels inside, or as many points of the display, if the desktop allows.
+    pub fn open(
+        event_loop: &ActiveEventLoop,
+        title: &str,
+        size: UVec2,
+        in_points: bool,
+    ) -> Result<Self, String> {
+        let [width, height] = size.max(UVec2::ONE).to_array();
+        let inside: Size = match in_points {
+            true => LogicalSize::new(width, height).into(),
+            false => PhysicalSize::new(width, height).into(),
+        };
+        let attributes = Window::default_attributes().with_title(title).with_inner_size(inside);
         #[cfg(target_os = "linux")]
         let attributes =
             winit::platform::x11::WindowAttributesExtX11::with_name(attributes, "penumbra", "penumbra");

@@ -169,10 +169,19 @@ pub fn develop_side(
 /// The line between both pictures.
 const LINE: [u8; 4] = [255, 190, 92, 255];
 
-/// Puts `side` over the left `part` of `bytes`, a picture of `size`, and a line where it ends.
+/// Where the one picture has nothing and the other has.
+const BESIDE: [u8; 4] = [24, 24, 28, 255];
+
+/// Puts `side` over the left `part` of `bytes`, a picture of `size`, and a line where it ends. A picture of another shape
+/// sees as far up and down from the middle, and farther or less far aside.
 pub fn cover(bytes: &mut [u8], size: UVec2, side: &Picture, part: f64) {
     let mut scaled = vec![0; bytes.len()];
-    scale_into(&side.rgba, side.size, &mut scaled, size);
+    let shape = |size: UVec2| f64::from(size.x) / f64::from(size.y.max(1));
+    if shape(size) == shape(side.size) {
+        scale_into(&side.rgba, side.size, &mut scaled, size);
+    } else {
+        scale_by_height(side, &mut scaled, size);
+    }
     let (stride, end) = (size.x as usize * 4, (part * f64::from(size.x)).round() as usize * 4);
     for (row, other) in bytes.chunks_exact_mut(stride).zip(scaled.chunks_exact(stride)) {
         let end = end.min(stride);
@@ -183,9 +192,28 @@ pub fn cover(bytes: &mut [u8], size: UVec2, side: &Picture, part: f64) {
     }
 }
 
+/// `side` in `to` pixels, as high as these, its middle column in the middle.
+fn scale_by_height(side: &Picture, target: &mut [u8], to: UVec2) {
+    let from = side.size;
+    if from.min_element() == 0 {
+        return;
+    }
+    let scale = f64::from(from.y) / f64::from(to.y);
+    let source = |x: u32| (f64::from(x) + 0.5 - 0.5 * f64::from(to.x)) * scale + 0.5 * f64::from(from.x);
+    for (y, row) in (0..to.y).zip(target.chunks_exact_mut(to.x as usize * 4)) {
+        let line = ((f64::from(y) + 0.5) * scale) as usize * from.x as usize;
+        for (x, pixel) in (0..to.x).zip(row.chunks_exact_mut(4)) {
+            let at = source(x);
+            let is_in = at >= 0.0 && at < f64::from(from.x);
+            let found = is_in.then(|| side.rgba.get((line + at as usize) * 4..)?.get(..4)).flatten();
+            pixel.copy_from_slice(found.unwrap_or(&BESIDE));
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::instrument::Reference;
+    use super::super::instrument::{Reference, Seen};
     use super::*;
     use crate::trace::Viewpoint;
     use glam::Vec3;
@@ -202,7 +230,7 @@ mod tests {
             }
         }
         let image = LinearImage { size: SIZE, pixels: vec![Vec3::splat(0.5); 4] };
-        let reference = has_reference.then(|| Reference::new(image, Viewpoint::default()));
+        let reference = has_reference.then(|| Reference::new(image, Viewpoint::default(), Seen::default()));
         let mut world = World::new();
         world.insert_resource(film);
         world.insert_resource(Instrument::against(reference));
@@ -272,6 +300,24 @@ mod tests {
             cover(&mut bytes, SIZE, &side, part);
             let seen: Vec<u8> = bytes.chunks_exact(4).map(|pixel| pixel[0]).collect();
             assert_eq!(seen, shades, "{part}");
+        }
+    }
+
+    #[test]
+    fn a_picture_of_another_shape_lies_on_its_middle() {
+        let pixel = |shade: u8| [shade, shade, shade, 255];
+        // Three columns, of which two fit; and one that leaves room on both sides.
+        let wide = Picture { size: UVec2::new(3, 1), rgba: [7, 8, 9].map(pixel).concat(), version: 0 };
+        let narrow = Picture { size: UVec2::new(1, 2), rgba: [5, 6].map(pixel).concat(), version: 0 };
+        for (side, size, wanted) in [
+            (&wide, UVec2::new(6, 2), vec![7, 7, 8, 8, 9, 9, 7, 7, 8, 8, 9, 9]),
+            (&wide, UVec2::new(2, 2), vec![8, 8, 8, 8]),
+            (&narrow, UVec2::new(3, 2), vec![24, 5, 24, 24, 6, 24]),
+        ] {
+            let mut bytes = vec![0; size.element_product() as usize * 4];
+            cover(&mut bytes, size, side, 1.0);
+            let seen: Vec<u8> = bytes.chunks_exact(4).map(|pixel| pixel[0]).collect();
+            assert_eq!(seen, wanted);
         }
     }
 }

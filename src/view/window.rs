@@ -72,6 +72,8 @@ pub struct Viewer {
     pub(super) notice: String,
     /// What was copied is there as long as this is.
     clipboard: Option<arboard::Clipboard>,
+    /// Where the recording says that the cursor is.
+    pub(super) recorded_cursor: Option<DVec2>,
     pub(super) title: String,
     pub(super) titled_at: Option<Instant>,
     pub(super) presented: VecDeque<Instant>,
@@ -145,6 +147,7 @@ impl Viewer {
             ui: Ui::default(),
             notice: String::new(),
             clipboard: None,
+            recorded_cursor: None,
             title: String::new(),
             titled_at: None,
             presented: VecDeque::new(),
@@ -228,14 +231,28 @@ impl Viewer {
         }
     }
 
-    /// Puts `text` on the clipboard, and says so.
-    fn copy(&mut self, text: String) {
+    /// What is on the clipboard.
+    pub(super) fn pasted(&mut self) -> Option<String> {
+        if self.clipboard.is_none() {
+            self.clipboard = arboard::Clipboard::new().ok();
+        }
+        self.clipboard.as_mut()?.get_text().ok()
+    }
+
+    /// Puts `text` on the clipboard, and says so after what was `said`.
+    fn copy(&mut self, said: &str, text: String) {
         if self.clipboard.is_none() {
             self.clipboard = arboard::Clipboard::new().ok();
         }
         let copied =
             self.clipboard.as_mut().is_some_and(|clipboard| clipboard.set_text(text.clone()).is_ok());
-        self.say(if copied { format!("copied: {text}") } else { text });
+        let is_short = said.is_empty();
+        self.say(match (copied, is_short) {
+            (true, true) => format!("copied: {text}"),
+            (false, true) => text,
+            (true, false) => format!("{said}; the command that renders it is on the clipboard"),
+            (false, false) => format!("{said}; the command that renders it is on standard output"),
+        });
     }
 
     pub(super) fn say(&mut self, text: String) {
@@ -269,7 +286,7 @@ impl ApplicationHandler<Wake> for Viewer {
         if self.screen.is_some() {
             return;
         }
-        match Screen::open(event_loop, &self.options.title, self.options.size) {
+        match Screen::open(event_loop, &self.options.title, self.options.size, self.options.in_points) {
             Ok(screen) => {
                 let size = screen.size();
                 self.screen = Some(screen);
@@ -292,8 +309,9 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.redraw_in_time();
             }
             Wake::Notice(text) => self.say(text),
-            Wake::Copy(text) => self.copy(text),
-            Wake::Opened(name) => {
+            Wake::Copy { said, text } => self.copy(&said, text),
+            Wake::Opened { name, folder } => {
+                self.options.folder = folder;
                 self.options.title = format!("Penumbra – {name}");
                 self.options.screenshot_stem = name;
                 self.redraw();

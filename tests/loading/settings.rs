@@ -188,6 +188,8 @@ fn models_that_are_missing_or_misplaced_are_named() {
     let refuse = |toml: &str| refusal("s.toml", toml);
     assert_says(&refuse("[[model]]\nfile = \"gone.obj\"\n"), "line 1, [[model]]: `gone.obj`: no such file");
     assert_says(&refuse("[[model]]\nfile = \"s.toml\"\n"), "cannot be a model");
+    // What Ctrl+E writes is no scene.
+    assert_says(&refuse("[[edit]]\nentity = [\"room\"]\nhidden = true\n"), "--scene-settings");
     assert_says(
         &refuse("[[model]]\nfile = \"x.obj\"\nscale = \"big\"\n"),
         "scale must be a number or three of them",

@@ -2,10 +2,12 @@
 
 use crate::geometry::shared;
 use bevy_ecs::name::Name;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use penumbra::load::{LoadOptions, SceneSource, load};
-use penumbra::scene::Mesh;
+use penumbra::scene::{Glossy, Layers, Material, Mesh};
+use penumbra::torture::light::kinds::Seen;
 use penumbra::torture::light::surfaces::floor_point;
+use penumbra::trace::bsdf::Lobes;
 use penumbra::trace::bsdf::normal::clear_of_surface;
 
 #[test]
@@ -21,6 +23,49 @@ fn a_normal_sets_in_to_turn_without_a_step() {
         assert!((now - before).length() < 4e-3, "a step at a tilt of {}", i as f32 * 5e-4);
         before = now;
     }
+}
+
+/// How much light falls on a matte surface does not depend on who looks, whatever normal it is smoothed by: at the rim of a
+/// smooth cylinder's cap that normal faces away from the eye.
+#[test]
+fn matte_surfaces_look_the_same_from_everywhere_whatever_their_normal() {
+    let matte = Material { base_color: Vec3::splat(0.6), ..Material::default() };
+    let plain = Glossy::Ggx { metallic: 0.0, roughness: 1.0, texture: None };
+    let dull = Layers { specular: 0.0, ..Layers::default() };
+    let layered = Material { glossy: plain, layers: Some(Box::new(dull)), ..matte.clone() };
+    let normal = Vec3::new(0.9, 0.0, 0.435_889_9);
+    for (name, material) in [("Lambert", &matte), ("layered", &layered)] {
+        let mut seen_away = 0;
+        for i in 0..200 {
+            let wo = toward_sphere(i, 200, 0.05);
+            let bsdf = Seen::new(material, wo).shaded_by(normal).bsdf();
+            seen_away += i32::from(wo.dot(normal) < 0.0);
+            for k in 0..50 {
+                let wi = toward_sphere(k, 50, 0.05);
+                let [diffuse, glossy] = bsdf.eval(wi);
+                let wanted = 0.6 * normal.dot(wi).max(0.0) / std::f32::consts::PI;
+                let off = (diffuse + glossy - wanted).abs().max_element();
+                assert!(off < 1e-5, "{name}, from {wo} lit from {wi}: {diffuse} + {glossy}, not {wanted}");
+            }
+            // And what is proposed is there.
+            let mut sum = 0.0;
+            for k in 0..64_u8 {
+                let u = Vec2::new((f32::from(k) + 0.5) / 64.0, (f32::from(k) * 0.618_034).fract());
+                let sample = bsdf.sample(0.5, u, Lobes::ALL);
+                sum += sample.map_or(0.0, |sample| sample.weight.max_element());
+            }
+            // A part of the hemisphere around the normal is below the surface.
+            assert!((0.3..0.61).contains(&(sum / 64.0)), "{name}, from {wo}: {}", sum / 64.0);
+        }
+        assert!(seen_away > 30, "{seen_away} eyes beyond the normal's horizon");
+    }
+}
+
+/// The `i`-th of `count` directions above the floor, at least `least` high.
+fn toward_sphere(i: u16, count: u16, least: f32) -> Vec3 {
+    let z = least + (1.0 - least) * (f32::from(i) + 0.5) / f32::from(count);
+    let (sin, cos) = (f32::from(i) * 2.399_963).sin_cos();
+    Vec3::new(cos, sin, 0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z
 }
 
 /// Bakers and renderers must agree on tangents: ours against those in files, by Blender, and (the helmet) by a

@@ -44,6 +44,8 @@ pub fn run(args: &WindowArgs) -> u8 {
     let options = ViewOptions {
         title: format!("Penumbra – {}", source.name()),
         size: wishes.size.unwrap_or(RenderSettings::default().size),
+        in_points: wishes.size.is_none(),
+        folder: source.folder(),
         screenshot_stem: source.name(),
         reference,
         keys,

@@ -3,7 +3,7 @@
 use super::Document;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
-use crate::scene::{Camera, Light, Projection};
+use crate::scene::{Aspect, Camera, Light, Projection};
 use glam::Vec3;
 use gltf::json::camera::Type as CameraType;
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
@@ -66,7 +66,7 @@ pub(super) fn camera_of(
     node: &Node,
     user: &str,
     sink: &mut Sink<'_>,
-) -> Result<Option<(String, Camera)>, LoadError> {
+) -> Result<Option<(String, Camera, Option<Aspect>)>, LoadError> {
     let Some(index) = &node.camera else {
         return Ok(None);
     };
@@ -76,11 +76,14 @@ pub(super) fn camera_of(
     let mut mend = |what: &str| {
         sink.repaired(document.file, &format!("camera {}", index.value()), what);
     };
+    let is_shape = |aspect: f32| aspect.is_finite() && aspect > 0.0;
+    let mut aspect = None;
     let projection = match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(CameraType::Perspective), Some(perspective), _) => {
             let fov = perspective.yfov;
-            if perspective.aspect_ratio.is_some_and(|aspect| !(aspect.is_finite() && aspect > 0.0)) {
-                mend("aspect ratio out of range, ignored as always: the picture decides");
+            aspect = perspective.aspect_ratio;
+            if aspect.is_some_and(|aspect| !is_shape(aspect)) {
+                mend("aspect ratio out of range, ignored");
             }
             if fov > 0.0 && fov < PI {
                 Projection::Perspective { vertical_fov: fov }
@@ -91,6 +94,7 @@ pub(super) fn camera_of(
         }
         (Checked::Valid(CameraType::Orthographic), _, Some(orthographic)) => {
             let height = 2.0 * orthographic.ymag.abs();
+            aspect = Some((orthographic.xmag / orthographic.ymag).abs());
             if orthographic.ymag > 0.0 && height.is_finite() {
                 Projection::Orthographic { height }
             } else if height > 0.0 && height.is_finite() {
@@ -106,5 +110,6 @@ pub(super) fn camera_of(
             Camera::default().projection
         }
     };
-    Ok(Some((name, Camera { projection })))
+    let aspect = aspect.filter(|&aspect| is_shape(aspect)).map(Aspect);
+    Ok(Some((name, Camera { projection }, aspect)))
 }

@@ -55,8 +55,11 @@ pub(super) fn spawn_scene(
         if let Some(light) = light::light_of(document, node, &user, sink)? {
             sink.world.entity_mut(entity).insert(light);
         }
-        if let Some((name, camera)) = light::camera_of(document, node, &user, sink)? {
+        if let Some((name, camera, aspect)) = light::camera_of(document, node, &user, sink)? {
             sink.world.entity_mut(entity).insert(camera);
+            if let Some(aspect) = aspect {
+                sink.world.entity_mut(entity).insert(aspect);
+            }
             sink.report.cameras.push((name, entity));
         }
     }

@@ -13,6 +13,7 @@
 //! statements are skipped.
 
 mod assemble;
+mod blender;
 mod lines;
 mod map;
 mod mtl;

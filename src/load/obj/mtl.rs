@@ -1,12 +1,15 @@
 //! MTL libraries → material entities. `tobj` parses what [`tidy`] lets through.
 
+use super::blender;
 use super::lines::{self, Statement, before_comment, unquoted};
 use super::map;
 use super::textures::Textures;
 use crate::load::report::{Kind, Sink};
 use crate::load::settings::Materials;
 use crate::load::source::{Folder, TEXT_LIMIT};
-use crate::scene::{Alpha, Anisotropy, Clearcoat, Glass, Glossy, Layers, Material, Sheen};
+use crate::scene::{
+    Alpha, Anisotropy, Body, Clearcoat, Glass, Glossy, Layers, Material, Sheen, Transmission,
+};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -96,7 +99,17 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
     };
     let tidied = tidy(library, &text, sink);
     match tobj::load_mtl_buf(&mut tidied.as_bytes()) {
-        Ok((materials, _)) => materials,
+        Ok((mut materials, _)) => {
+            let smoothest = blender::smoothest(&text);
+            let count =
+                |most| materials.iter_mut().filter_map(|m| blender::restate(m, most).then_some(())).count();
+            if smoothest.map_or(0, count) > 0 {
+                let what =
+                    "written by Blender: Ns says roughness, Ks the strength of gloss, illum 3 and 6 metal";
+                sink.decide(library, what);
+            }
+            materials
+        }
         Err(why) => {
             sink.ignored(file, "", format!("material library `{library}` cannot be read: {why}"));
             Vec::new()
@@ -188,26 +201,30 @@ fn scalar(material: &tobj::Material, keyword: &str) -> Option<f32> {
 
 fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink: &mut Sink<'_>) -> Material {
     let name = &material.name;
-    let mut out_of_range = false;
-    let mut within = |value: f32, low: f32, high: f32| {
-        out_of_range |= !(low..=high).contains(&value);
+    let mut out_of_range = BTreeSet::new();
+    let mut within = |keyword: &str, value: f32, low: f32, high: f32| {
+        if !(low..=high).contains(&value) {
+            out_of_range.insert(format!("{keyword} {value}"));
+        }
         value.clamp(low, high)
     };
-    let mut unit = |color: Vec3| Vec3::from(color.to_array().map(|value| within(value, 0.0, 1.0)));
+    let mut unit = |keyword: &str, color: Vec3| {
+        Vec3::from(color.to_array().map(|value| within(keyword, value, 0.0, 1.0)))
+    };
     let has_texture = material.diffuse_texture.is_some();
     let mut diffuse =
-        unit(material.diffuse.map_or(Vec3::splat(if has_texture { 1.0 } else { 0.8 }), Vec3::from));
+        unit("Kd", material.diffuse.map_or(Vec3::splat(if has_texture { 1.0 } else { 0.8 }), Vec3::from));
     if material.specular.is_none() && material.specular_texture.is_some() {
         let what = "map_Ks without Ks, which says how much: left out";
         sink.ignored(file, &format!("material `{name}`"), what);
     }
-    let mut specular = unit(material.specular.map_or(Vec3::ZERO, Vec3::from));
-    let tint = unit(color(material, "Tf").unwrap_or(Vec3::ONE));
+    let mut specular = unit("Ks", material.specular.map_or(Vec3::ZERO, Vec3::from));
+    let tint = unit("Tf", color(material, "Tf").unwrap_or(Vec3::ONE));
     let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
     // A map alone is the value itself; what stands in for one that is not there is no lamp.
     let unsaid = if textures.has(material, "map_Ke") { Vec3::ONE } else { Vec3::ZERO };
     let emission = material.emissive.map_or(unsaid, Vec3::from).max(Vec3::ZERO);
-    let exponent = within(material.shininess.unwrap_or(0.0), 0.0, 1e6);
+    let exponent = within("Ns", material.shininess.unwrap_or(0.0), 0.0, 1e6);
     let opacity = material
         .dissolve
         // Some exporters write `Tr 1` for what is there; nobody makes a model that cannot be seen.
@@ -216,8 +233,9 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
                 .filter(|&transparency| transparency < 1.0)
                 .map(|transparency| 1.0 - transparency)
         });
-    let opacity = within(opacity.unwrap_or(1.0), 0.0, 1.0);
-    let mut fraction = |keyword: &str| scalar(material, keyword).map(|value| within(value, 0.0, 1.0));
+    let opacity = within("d", opacity.unwrap_or(1.0), 0.0, 1.0);
+    let mut fraction =
+        |keyword: &str| scalar(material, keyword).map(|value| within(keyword, value, 0.0, 1.0));
     let is_pbr = ["Pr", "Pm", "map_Pr", "map_Pm"].iter().any(|keyword| is_mapped(keyword))
         || ["Ps", "Pc", "aniso"].iter().any(|keyword| fraction(keyword).is_some_and(|factor| factor > 0.0));
     // A picture of what is 0 would not be seen.
@@ -249,9 +267,22 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         rotation: fraction("anisor").unwrap_or(0.0) * std::f32::consts::TAU,
         texture: None,
     });
+    if let Some(gloss) = scalar(material, blender::GLOSS) {
+        layers.specular_color = Vec3::splat(gloss);
+    }
+    layers.transmission = scalar(material, blender::THROUGH).map(|factor| Transmission {
+        factor,
+        texture: None,
+        body: Some(Body { absorption: Vec3::ZERO }),
+    });
     let ior = material.optical_density.filter(|&ior| ior > 1.0).unwrap_or(1.5);
-    if out_of_range {
-        sink.repaired(file, &format!("material `{name}`"), "a value is out of range, clamped");
+    if !out_of_range.is_empty() {
+        let which = out_of_range.into_iter().collect::<Vec<_>>().join(", ");
+        sink.repaired(
+            file,
+            &format!("material `{name}`"),
+            format!("a value is out of range, clamped: {which}"),
+        );
     }
     let model = material.illumination_model.unwrap_or(2);
     let passes = matches!(model, 4 | 6 | 7 | 9);
@@ -261,7 +292,10 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let is_black = diffuse == Vec3::ZERO && !has_texture;
     let is_glass = passes && (is_bent || is_tinted || is_black);
     if passes && !is_glass {
-        let what = format!("illum {model} without Ni above 1, Tf or black Kd: no glass, but its Kd");
+        let what = match opacity < 1.0 {
+            true => format!("illum {model} with d {opacity}: half-transparent, no glass"),
+            false => format!("illum {model} without Ni above 1, Tf or black Kd: no glass, but its Kd"),
+        };
         sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);
     }
     if has_texture && !is_glass && diffuse == Vec3::ZERO {

@@ -172,6 +172,11 @@ impl Settings {
         Ok(Self { file: file.to_owned(), folder, text, tables })
     }
 
+    /// Whether it has edits, and nothing that they could be of.
+    pub(super) fn is_of_a_scene(&self) -> bool {
+        !(self.has_models() || self.tables.edit.is_empty())
+    }
+
     /// Whether it is a scene of its own.
     pub(super) fn has_models(&self) -> bool {
         !self.tables.model.is_empty()

@@ -49,6 +49,13 @@ impl Seen {
         Self { stage, surface, at }
     }
 
+    /// The same where the surface is smoothed: with this normal to shade by.
+    #[must_use]
+    pub fn shaded_by(mut self, normal: Vec3) -> Self {
+        self.at.normal = normal.normalize();
+        self
+    }
+
     /// The lobes there.
     #[must_use]
     pub fn bsdf(&self) -> Bsdf {

@@ -106,13 +106,21 @@ impl Base {
         [diffuse + multiple, facets]
     }
 
-    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, shares: &[f32; 5]) -> Evaluated {
-        let mut sum = Evaluated { pdf: shares[0] * wi.z / PI, ..Evaluated::default() };
-        let part = Reflected::table().at(wi.z, self.roughness);
-        let whole = part.element_sum().min(1.0);
-        let passed = 1.0 - self.interface.reflects(part);
-        sum.diffuse = (self.diffuse * passed + self.multiple * (1.0 - whole)) * wi.z;
-        if let Some(h) = (wo + wi).try_normalize() {
+    /// Both in the facets' frame; `cos` is that of `wi` to the normal of the wide lobes.
+    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, cos: f32, shares: &[f32; 5]) -> Evaluated {
+        let mut sum = Evaluated::default();
+        let mut whole = 1.0;
+        if cos > 0.0 {
+            let part = Reflected::table().at(cos, self.roughness);
+            whole = part.element_sum().min(1.0);
+            let passed = 1.0 - self.interface.reflects(part);
+            sum.pdf = shares[0] * cos / PI;
+            sum.diffuse = (self.diffuse * passed + self.multiple * (1.0 - whole)) * cos;
+        }
+        if let Some(h) = (wo + wi).try_normalize().filter(|_| wi.z > 0.0) {
+            if cos != wi.z && self.gain.is_some() {
+                whole = Reflected::table().at(wi.z, self.roughness).element_sum().min(1.0);
+            }
             let s = schlick(wo.dot(h));
             let mut fresnel = self.f0 * (1.0 - s) + self.f90 * s;
             if let Some(gain) = self.gain {

@@ -8,10 +8,13 @@ use crate::trace::warp::{cosine_hemisphere, spherical};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// A sum of lobes around one normal.
+/// A sum of lobes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Classic {
+    /// Of all lobes but Lambert's: it mirrors the eye away from the surface.
     pub(super) normal: Vec3,
+    /// Of Lambert's.
+    pub(super) wide: Vec3,
     pub(super) wo: Vec3,
     /// Albedo of the Lambert lobe.
     pub(super) diffuse: Vec3,
@@ -33,12 +36,12 @@ impl Classic {
     /// For `wi` on the eye's side of the surface.
     #[inline]
     pub(super) fn eval(&self, wi: Vec3) -> [Vec3; 2] {
+        let lambert = self.diffuse * (self.wide.dot(wi).max(0.0) / PI);
         let n_dot_l = self.normal.dot(wi);
-        if n_dot_l <= 0.0 || self.normal.dot(self.wo) <= 0.0 {
-            return [Vec3::ZERO; 2];
-        }
-        let lambert = self.diffuse * (n_dot_l / PI);
         let Some((specular, exponent)) = self.phong else { return [lambert, Vec3::ZERO] };
+        if n_dot_l <= 0.0 || self.normal.dot(self.wo) <= 0.0 {
+            return [lambert, Vec3::ZERO];
+        }
         let Some(h) = (self.wo + wi).try_normalize() else { return [lambert, Vec3::ZERO] };
         let scale = phong_normalization(exponent) * self.normal.dot(h).max(0.0).powf(exponent);
         [lambert, specular * (scale * n_dot_l)]
@@ -46,12 +49,11 @@ impl Classic {
 
     #[inline]
     pub(super) fn pdf(&self, wi: Vec3, lobes: Lobes) -> f32 {
-        let n_dot_l = self.normal.dot(wi);
-        if n_dot_l <= 0.0 || self.normal.dot(self.wo) <= 0.0 || !self.has(lobes) {
+        if !self.has(lobes) {
             return 0.0;
         }
         let shares = self.shares(lobes);
-        let mut pdf = shares[0] * n_dot_l / PI;
+        let mut pdf = shares[0] * self.wide.dot(wi).max(0.0) / PI;
         if shares[1] > 0.0
             && let Some((_, exponent)) = self.phong
             && let Some(h) = (self.wo + wi).try_normalize()
@@ -72,10 +74,10 @@ impl Classic {
         let shares = self.shares(lobes);
         let (lobe, _) = pick(&shares, choice)?;
         Some(match lobe {
-            0 => Proposal::reflected(self.world(cosine_hemisphere(u))),
+            0 => Proposal::reflected(around(self.wide, cosine_hemisphere(u))),
             1 => {
                 let (_, exponent) = self.phong?;
-                let h = self.world(spherical(u.x.powf(1.0 / (exponent + 1.0)), u.y));
+                let h = around(self.normal, spherical(u.x.powf(1.0 / (exponent + 1.0)), u.y));
                 Proposal::reflected(reflect(self.wo, h))
             }
             2 => {
@@ -116,11 +118,12 @@ impl Classic {
         };
         Some(Proposal { wi, through, follow: true, delta: Some(weight / share) })
     }
+}
 
-    fn world(&self, local: Vec3) -> Vec3 {
-        let (tangent, bitangent) = self.normal.any_orthonormal_pair();
-        (tangent * local.x + bitangent * local.y + self.normal * local.z).normalize()
-    }
+/// `local`, in a frame whose z is `normal`, in the world.
+fn around(normal: Vec3, local: Vec3) -> Vec3 {
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    (tangent * local.x + bitangent * local.y + normal * local.z).normalize()
 }
 
 /// Factor that makes the Blinn-Phong lobe reflect its specular colour at normal incidence:

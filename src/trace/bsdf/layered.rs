@@ -24,6 +24,8 @@ pub(super) struct Layered {
     frame: Mat3,
     /// In that frame.
     wo: Vec3,
+    /// The normal of the base's wide lobes in that frame, where it is another.
+    wide: Option<Vec3>,
     base: Base,
     sheen: Option<SheenLobe>,
     coat: Option<Coat>,
@@ -99,7 +101,7 @@ impl Layered {
         scene: &TraceScene,
         surface: &Surface,
         at: &Interaction,
-        normal: Vec3,
+        [normal, wide]: [Vec3; 2],
         color: Vec3,
         metallic: f32,
         roughness: f32,
@@ -155,7 +157,8 @@ impl Layered {
             let facets = Microfacets::new(roughness * roughness);
             Coat { frame, wo, facets, roughness, factor, rest: Coat::rest(factor, roughness, wo.z) }
         });
-        let mut layered = Self { frame, wo, base, sheen, coat, glass, powers: [0.0; 5] };
+        let wide = (wide != normal).then(|| frame.transpose() * wide);
+        let mut layered = Self { frame, wo, wide, base, sheen, coat, glass, powers: [0.0; 5] };
         layered.powers = layered.powers();
         layered
     }
@@ -212,8 +215,9 @@ impl Layered {
         let local = self.frame.transpose() * wi;
         let shares = self.shares(lobes);
         let mut sum = Evaluated::default();
-        if above && local.z > 0.0 {
-            sum = self.base.evaluate(self.wo, local, &shares);
+        let cos = self.wide.map_or(local.z, |wide| wide.dot(local));
+        if above && local.z.max(cos) > 0.0 {
+            sum = self.base.evaluate(self.wo, local, cos, &shares);
         }
         if let Some(glass) = &self.glass
             && above == (local.z > 0.0)
@@ -250,7 +254,10 @@ impl Layered {
         let (lobe, rest) = pick(&shares, choice)?;
         let world = |local: Vec3| (self.frame * local).normalize();
         match lobe {
-            0 => Some(Proposal::reflected(world(cosine_hemisphere(u)))),
+            0 => {
+                let local = cosine_hemisphere(u);
+                Some(Proposal::reflected(world(self.wide.map_or(local, |wide| frame_around(wide) * local))))
+            }
             1 => mirrored(&self.frame, &self.base.facets, self.wo, u),
             2 => {
                 let coat = self.coat.as_ref()?;

@@ -91,20 +91,18 @@ impl Bsdf {
             || surface.normal_map.is_some()
             || material.mirror != Vec3::ZERO
             || material.glass.is_some();
-        // Lambert looks the same from everywhere: there it is enough that the normal is seen at all.
-        let normal = match &surface.normal_map {
-            Some(map) => normal::clear_of_surface(normal::tilted(scene, map, at), at),
-            None if mirrors => normal::clear_of_surface(at.normal, at),
-            None => normal::facing(at.normal, at),
-        };
+        let shading = surface.normal_map.as_ref().map_or(at.normal, |map| normal::tilted(scene, map, at));
+        let wide = normal::facing(shading, at);
+        let normal = if mirrors { normal::clear_of_surface(shading, at) } else { wide };
         let kind = match &material.glossy {
             Glossy::Ggx { metallic, roughness, .. } => {
                 let texel = scene.texture(surface.glossy_texture, at.uvs);
                 let (metallic, roughness) = (metallic * texel.z, roughness * texel.y);
-                Kind::Layered(Layered::new(scene, surface, at, normal, base, metallic, roughness))
+                Kind::Layered(Layered::new(scene, surface, at, [normal, wide], base, metallic, roughness))
             }
             glossy => Kind::Classic(Classic {
                 normal,
+                wide,
                 wo: at.wo,
                 diffuse: base,
                 phong: match glossy {
@@ -120,10 +118,10 @@ impl Bsdf {
                 front: at.front,
             }),
         };
-        Self { normal, geometric_normal: at.geometric_normal, side: at.side(), kind }
+        Self { normal: wide, geometric_normal: at.geometric_normal, side: at.side(), kind }
     }
 
-    /// Unit shading normal, on the side of the eye.
+    /// Unit normal of the wide lobes, on the eye's side of the surface.
     #[must_use]
     pub fn normal(&self) -> Vec3 {
         self.normal

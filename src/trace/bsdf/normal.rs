@@ -23,14 +23,13 @@ pub fn tilted(scene: &TraceScene, map: &NormalMap<TextureIndex>, at: &Interactio
     (along + at.normal * texel.z).try_normalize().unwrap_or(at.normal)
 }
 
-/// `normal`, or the geometric one if it faces away from the eye, for that would shade black.
+/// `normal` for wide lobes, or the geometric one if they are on different sides of the surface.
+///
+/// How much light falls on a surface does not depend on who looks: unlike a mirror's, this normal may face away from the
+/// eye. Bent toward it, the rims of smooth things would be lit that no light falls on.
 #[must_use]
 pub fn facing(normal: Vec3, at: &Interaction) -> Vec3 {
-    if normal.dot(at.wo) > 0.0 && normal.dot(at.geometric_normal) > 0.0 {
-        normal
-    } else {
-        at.geometric_normal
-    }
+    if normal.dot(at.geometric_normal) > 0.0 { normal } else { at.geometric_normal }
 }
 
 /// Cosine to the geometric normal that a mirrored ray keeps at least.

@@ -37,6 +37,6 @@ fn redo(world: &mut World, editor: &mut Editor, table: EditTable) {
     // What does not fit any more, such as the sizes of another kind of light, is as the files say.
     if let Ok(Changed::New(entity)) = change(world, &table) {
         editor.copies.push((entity, original));
-        editor.undo.push(Undo::of_copy(Selection { entity, slot }));
+        editor.undo.push(Undo::of_copy(Selection { entity, slot }, selection));
     }
 }

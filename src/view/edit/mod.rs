@@ -178,17 +178,23 @@ fn change(world: &mut World, editor: &mut Editor, property: Property, value: f64
 }
 
 fn step(world: &mut World, editor: &mut Editor, steps: f64) {
-    let Some(Selection { entity, slot }) = editor.selected else {
-        return say(world, "select something first: M, or Ctrl+PageDown");
-    };
+    let Some(Selection { entity, slot }) = selected(world, editor) else { return };
     let rows = rows(world, entity, slot, radius(world));
     if let Some(row) = rows.get(editor.row.min(rows.len().saturating_sub(1))) {
         change(world, editor, row.property, row.stepped(steps));
     }
 }
 
+/// What is selected; if nothing is, that is said.
+fn selected(world: &mut World, editor: &Editor) -> Option<Selection> {
+    if editor.selected.is_none() {
+        say(world, "select something first: M, or Ctrl+PageDown");
+    }
+    editor.selected
+}
+
 fn hide(world: &mut World, editor: &mut Editor) {
-    let Some(selection) = editor.selected else { return };
+    let Some(selection) = selected(world, editor) else { return };
     remember(world, editor, selection, None);
     let mut entity = world.entity_mut(selection.entity);
     if entity.contains::<Hidden>() {
@@ -200,14 +206,14 @@ fn hide(world: &mut World, editor: &mut Editor) {
 }
 
 fn copy(world: &mut World, editor: &mut Editor) {
-    let Some(selection) = editor.selected else { return };
+    let Some(selection) = selected(world, editor) else { return };
     let path = path_of(world, selection.entity);
     let name = format!("{} copy {}", path.last().map_or("", String::as_str), editor.copies.len() + 1);
     let copy = duplicate(world, selection.entity, &name);
     crate::app::propagate(world);
     editor.copies.push((copy, selection.entity));
     let copied = Selection { entity: copy, slot: selection.slot };
-    editor.undo.push(Undo::of_copy(copied));
+    editor.undo.push(Undo::of_copy(copied, selection));
     editor.selected = Some(copied);
     // Beside the original, not in it.
     let aside = rows(world, copy, 0, radius(world)).first().map(|row| row.stepped(5.0));

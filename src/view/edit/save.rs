@@ -1,7 +1,7 @@
 //! What was edited, as a settings file that `render` reads.
 
 use super::super::controls::Notice;
-use super::super::flags::{look_flags, shell_line};
+use super::super::flags::{absolute, look_flags, shell_line};
 use super::Editor;
 use crate::load::SceneSource;
 use crate::load::settings::edit::{EditTable, LightEdit, MaterialEdit, rows_of};
@@ -89,12 +89,13 @@ pub fn edits(world: &World, editor: &Editor) -> Result<String, String> {
 #[must_use]
 pub fn save(world: &World, editor: &Editor) -> Notice {
     match write(world, editor) {
-        Ok(said) => Notice::Print(said),
+        Ok((path, command)) => Notice::Saved(format!("saved {path}"), command),
         Err(why) => Notice::Text(format!("not saved: {why}")),
     }
 }
 
-fn write(world: &World, editor: &Editor) -> Result<String, String> {
+/// Where it was written, and the command.
+fn write(world: &World, editor: &Editor) -> Result<(String, String), String> {
     let origin = world.get_resource::<SceneOrigin>().ok_or("the scene is of no file")?;
     if !editor.has_edits() && origin.options.edits.is_none() {
         return Err("nothing was edited".to_owned());
@@ -108,9 +109,14 @@ fn write(world: &World, editor: &Editor) -> Result<String, String> {
                 file.write_all(text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
                 let path = path.strip_prefix(".").unwrap_or(&path).display().to_string();
                 let mut command = ["penumbra", "render"].map(str::to_owned).to_vec();
-                command.extend([origin.source.to_string(), "--scene-settings".to_owned(), path]);
+                let scene = match &origin.source {
+                    SceneSource::File(scene) => absolute(scene),
+                    other => other.to_string(),
+                };
+                let settings = absolute(path.as_ref());
+                command.extend([scene, "--scene-settings".to_owned(), settings]);
                 command.extend(look_flags(world));
-                return Ok(shell_line(&command));
+                return Ok((path, shell_line(&command)));
             }
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
             Err(error) => return Err(format!("{}: {error}", path.display())),

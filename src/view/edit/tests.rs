@@ -114,6 +114,34 @@ fn undo_brings_everything_back_to_the_bit() {
 }
 
 #[test]
+fn an_undone_copy_is_gone_and_with_all_undone_nothing_was_edited() {
+    let mut app = editable("cornell");
+    choose(&mut app, PLACES[0]);
+    let before = status(&app);
+    press(&mut app, Tap::Duplicate, PLACES[0]);
+    assert!(status(&app).place[1] > before.place[1]);
+    press(&mut app, Tap::More, PLACES[0]);
+    press(&mut app, Tap::Undo, PLACES[0]);
+    press(&mut app, Tap::Undo, PLACES[0]);
+    assert_eq!((&status(&app).name, status(&app).place), (&before.name, before.place));
+    let editor = app.world.resource::<Editor>();
+    assert!(!editor.has_edits() && editor.written().is_empty(), "{}", editor.written());
+    press(&mut app, Tap::SaveEdits, PLACES[0]);
+    let said = app.world.resource::<Notices>().0.last().cloned();
+    assert_eq!(said, Some(Notice::Text("not saved: nothing was edited".to_owned())));
+}
+
+#[test]
+fn who_selects_nothing_is_told() {
+    for tap in [Tap::Hide, Tap::Duplicate, Tap::More] {
+        let mut app = editable("cornell");
+        press(&mut app, tap, PLACES[0]);
+        let said = app.world.resource::<Notices>().0.last().cloned();
+        assert!(matches!(said, Some(Notice::Text(text)) if text.starts_with("select something")), "{tap:?}");
+    }
+}
+
+#[test]
 fn only_what_must_be_is_redone_and_it_is_told() {
     let mut app = editable("cornell");
     choose(&mut app, PLACES[1]);

@@ -4,13 +4,21 @@ use super::property::{Property, material_of};
 use super::{Editor, Selection, say};
 use crate::scene::{Hidden, Light, Material, Pose, Transform};
 use bevy_ecs::prelude::*;
+use std::time::{Duration, Instant};
+
+/// Changes of a number within this time of each other are one step.
+const ONE_STEP: Duration = Duration::from_secs(1);
 
 /// How things were.
 #[derive(Clone, Debug)]
 pub(super) struct Undo {
     pub(super) selection: Selection,
-    /// Changes of one number in a row are one step.
+    /// If it is a copy, what that is of.
+    pub(super) original: Option<Selection>,
+    /// Changes of one number in a row are one step ...
     pub(super) property: Option<Property>,
+    /// ... if they follow each other soon.
+    pub(super) at: Instant,
     pub(super) transform: Option<Transform>,
     /// Where the animation, if there is one, had put it.
     pub(super) pose: Option<Pose>,
@@ -20,31 +28,39 @@ pub(super) struct Undo {
 }
 
 impl Undo {
-    /// To undo a copy is to hide it: what it was then is not there.
-    pub(super) fn of_copy(selection: Selection) -> Self {
+    /// To undo a copy is to have it no more.
+    pub(super) fn of_copy(selection: Selection, original: Selection) -> Self {
         Self {
             selection,
+            original: Some(original),
             property: None,
+            at: Instant::now(),
             transform: None,
             pose: None,
             light: None,
             material: None,
-            hidden: true,
+            hidden: false,
         }
     }
 }
 
 /// Remembers how it is now.
 pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection, property: Option<Property>) {
-    let last = editor.undo.last();
-    if property.is_some() && last.is_some_and(|u| (u.selection, u.property) == (selection, property)) {
+    let now = Instant::now();
+    if let Some(last) = editor.undo.last_mut().filter(|_| property.is_some())
+        && (last.selection, last.property) == (selection, property)
+        && now - last.at < ONE_STEP
+    {
+        last.at = now;
         return;
     }
     let Selection { entity, slot } = selection;
     let material = material_of(world, entity, slot);
     editor.undo.push(Undo {
         selection,
+        original: None,
         property,
+        at: now,
         transform: world.get::<Transform>(entity).copied(),
         pose: world.get::<Pose>(entity).copied(),
         light: world.get::<Light>(entity).cloned(),
@@ -56,6 +72,14 @@ pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection,
 pub(super) fn undo(world: &mut World, editor: &mut Editor) {
     let Some(last) = editor.undo.pop() else { return say(world, "nothing to undo") };
     let entity = last.selection.entity;
+    if let Some(original) = last.original {
+        editor.copies.retain(|(copy, _)| *copy != entity);
+        editor.edited.retain(|(edited, _)| *edited != entity);
+        world.despawn(entity);
+        crate::app::propagate(world);
+        editor.selected = Some(original);
+        return forget(editor);
+    }
     // What an animation has moved since stays where that put it.
     if let Some(transform) = last.transform
         && world.get::<Pose>(entity).copied() == last.pose
@@ -82,4 +106,12 @@ pub(super) fn undo(world: &mut World, editor: &mut Editor) {
     }
     crate::app::propagate(world);
     editor.selected = Some(last.selection);
+    forget(editor);
+}
+
+/// With all of it undone, nothing was edited.
+fn forget(editor: &mut Editor) {
+    if editor.undo.is_empty() {
+        editor.edited.clear();
+    }
 }

@@ -49,11 +49,14 @@ fn where_there_is_no_reference_the_picture_is_shown_and_told() {
     let mut world = World::new();
     let size = UVec2::new(2, 1);
     let image = LinearImage { size, pixels: vec![Vec3::ONE; 2] };
-    world.insert_resource(Instrument::against(Some(Reference::new(image, Viewpoint::default()))));
+    world.init_resource::<RenderSettings>();
+    let reference = Reference::new(image, Viewpoint::default(), Seen::of(&world));
+    world.insert_resource(Instrument::against(Some(reference)));
     world.insert_resource(PixelView::Error);
     world.insert_resource(Film::new(size, 0));
     world.init_resource::<Viewpoint>();
     world.init_resource::<FrameBudget>();
+    world.init_resource::<Unknown>();
     world.init_resource::<Display>();
     world.init_resource::<FirstHits>();
     world.init_resource::<CurrentLegend>();
@@ -69,7 +72,7 @@ fn where_there_is_no_reference_the_picture_is_shown_and_told() {
     let moved = glam::DAffine3::from_translation(glam::DVec3::X);
     world.insert_resource(Viewpoint::new(&moved, crate::scene::Camera::default().projection));
     let (develops, has_scale, title) = shown(&mut world);
-    assert!(develops && !has_scale && title.contains("no reference"), "{title}");
+    assert!(develops && !has_scale && title.contains("another view"), "{title}");
     world.insert_resource(Viewpoint::default());
     world.insert_resource(Film::new(size + 1, 0));
     assert!(shown(&mut world).0, "of another size");

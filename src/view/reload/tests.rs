@@ -117,7 +117,7 @@ fn edits_are_known_after_any_number_of_reloads_and_undone_to_what_the_files_say(
     let fresh = identity(&stage.scene_shown());
     let mut app = again(&mut app);
     press(&mut app, &[Tap::SaveEdits]);
-    let Notice::Print(line) = last_notice(&app) else { panic!("{:?}", last_notice(&app)) };
+    let Notice::Saved(_, line) = last_notice(&app) else { panic!("{:?}", last_notice(&app)) };
     discard_saved(&line);
     press(&mut app, &[Tap::Undo; 4]);
     assert_eq!(last_notice(&app), Notice::Text("nothing to undo".to_owned()));
@@ -230,7 +230,7 @@ fn the_printed_command_makes_what_is_seen_with_a_dropped_sky_and_all_settings() 
     settings.filter = Some(Filter::Nearest);
     app.world.resource_mut::<Display>().tone_map = ToneMap::AgX;
     press(&mut app, &[Tap::SaveEdits]);
-    let Notice::Print(line) = last_notice(&app) else { panic!("{:?}", last_notice(&app)) };
+    let Notice::Saved(_, line) = last_notice(&app) else { panic!("{:?}", last_notice(&app)) };
     let cli = Cli::try_parse_from(line.split_whitespace()).unwrap();
     let Some(Command::Render(render)) = cli.command else { panic!("{line}") };
     let output = render.output.clone();

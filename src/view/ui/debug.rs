@@ -4,27 +4,34 @@ use super::super::debug::boxes::{Boxes, Statistics};
 use super::super::debug::{DebugStatus, Told, color_of};
 use super::super::status::{counted, significant};
 use super::card;
+use super::place::Places;
 use super::style::{ACCENT, FAINT, MARGIN};
 use crate::bvh::inspect::{Order, Visited, Visits};
 use crate::trace::explain::{Kind, LightRow};
-use egui::{Align2, Color32, Context, Grid, RichText, Ui, vec2};
+use egui::{Align2, Color32, Context, Grid, Rect, RichText, Ui, vec2};
 
 /// More lines would cover the picture.
 const MOST_ROWS: usize = 9;
 
-/// Shows the cards in the lower left corner.
-pub fn show(context: &Context, status: &DebugStatus) {
+/// Shows the card in the lower left corner, or where that is taken beside it.
+pub fn show(context: &Context, status: &DebugStatus, places: &Places) -> Option<Rect> {
     if status.told.is_none() && status.statistics.is_none() {
-        return;
+        return None;
     }
-    card(context, "debug", Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN), |ui| {
+    let corners = [
+        (Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN)),
+        (Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN)),
+        (Align2::RIGHT_BOTTOM, vec2(-MARGIN, -MARGIN)),
+    ];
+    let place = places.find(context, "debug", &corners);
+    Some(card(context, "debug", place, |ui| {
         if let Some(statistics) = &status.statistics {
             show_statistics(ui, status.boxes, statistics);
         }
         if let Some(told) = &status.told {
             show_pixel(ui, told, status);
         }
-    });
+    }))
 }
 
 fn faint(ui: &mut Ui, text: impl Into<String>) {
@@ -35,7 +42,7 @@ fn show_statistics(ui: &mut Ui, boxes: Boxes, statistics: &Statistics) {
     let title = match boxes {
         Boxes::Off => "hierarchy".to_owned(),
         Boxes::Level(level) => format!("hierarchy: level {level} of {}", statistics.levels),
-        Boxes::Leaves => "hierarchy: leaves".to_owned(),
+        Boxes::Leaves => format!("hierarchy: leaves of {}", counted(statistics.levels as usize, "level")),
     };
     ui.label(RichText::new(title).color(ACCENT));
     let [shown, wanted] = statistics.shown;
@@ -103,13 +110,15 @@ fn show_pixel(ui: &mut Ui, told: &Told, status: &DebugStatus) {
         let (at, of) = (status.step, steps.len());
         faint(ui, format!("step {at} of {of}: {what}, entered at {:.3}{found}", step.near));
     } else {
-        faint(ui, format!("{} steps: ; and ' go through them, O changes the order", steps.len()));
+        faint(ui, format!("{}: ; and ' go through them, O changes the order", counted(steps.len(), "step")));
     }
 }
 
 fn cost_line(name: &str, visits: &Visits) -> String {
     let Visits { nodes, boxes, triangles, waiting } = visits;
-    format!("{name}: {nodes} nodes, {boxes} boxes, {triangles} triangles, {waiting} waiting at most")
+    let (nodes, triangles) = (counted(*nodes as usize, "node"), counted(*triangles as usize, "triangle"));
+    let boxes = if *boxes == 1 { "1 box".to_owned() } else { format!("{boxes} boxes") };
+    format!("{name}: {nodes}, {boxes}, {triangles}, {waiting} waiting at most")
 }
 
 fn show_light(ui: &mut Ui, row: &LightRow) {

@@ -2,45 +2,83 @@
 
 use super::super::edit::EditStatus;
 use super::super::edit::property::{Property, Row};
+use super::place::Places;
 use super::style::{self, ACCENT, CAUTION, FAINT, MARGIN};
-use egui::{Align2, Area, Context, DragValue, Grid, Id, RichText, vec2};
+use egui::scroll_area::ScrollSource;
+use egui::{Align2, Area, Context, DragValue, Grid, Id, Rect, RichText, ScrollArea, Ui, vec2};
 
-/// Shows the card at the right border; what the user changes on it goes to `changed`.
-pub fn show(context: &Context, status: &EditStatus, changed: &mut Vec<(Property, f64)>) {
-    Area::new(Id::new("edit")).anchor(Align2::RIGHT_CENTER, vec2(-MARGIN, 0.0)).fade_in(false).show(
-        context,
-        |ui| {
-            style::frame().show(ui, |ui| {
-                ui.label(RichText::new(&status.name).color(ACCENT));
+/// Of the card, points: it shall not move under the mouse.
+pub const WIDTH: f32 = 214.0;
+/// Of the names of numbers, and of the fields for these.
+const NAMES: f32 = 74.0;
+const FIELD: f32 = 96.0;
+/// Room for the names above the numbers, and for what is told below them.
+const HEAD: f32 = 64.0;
+const FOOT: f32 = 52.0;
+
+/// Shows the card at the right border, between the cards above and below; what the user changes on it goes to `changed`.
+pub fn show(
+    context: &Context,
+    status: &EditStatus,
+    places: &Places,
+    changed: &mut Vec<(Property, f64)>,
+) -> Rect {
+    let right = places.room.right();
+    let left = right - WIDTH - MARGIN;
+    let (top, bottom) = (places.reach(left, right, true), places.reach(left, right, false));
+    let height = (places.room.height() - top - bottom).max(3.0 * MARGIN);
+    let area = Area::new(Id::new("edit")).anchor(Align2::RIGHT_TOP, vec2(-MARGIN, top)).fade_in(false);
+    let shown = area.show(context, |ui| {
+        style::frame().show(ui, |ui| {
+            let frame = style::frame().total_margin().sum();
+            ui.set_width((WIDTH - frame.x).min(places.room.width()));
+            ui.label(RichText::new(&status.name).color(ACCENT));
+            let [here, all] = status.place;
+            ui.horizontal_wrapped(|ui| {
                 if let Some(kind) = &status.kind {
-                    ui.label(kind);
+                    ui.label(RichText::new(kind).small());
                 }
-                let [here, all] = status.place;
                 ui.label(RichText::new(format!("{here} of {all}")).color(FAINT).small());
                 if status.hidden {
                     ui.label(RichText::new("hidden").color(CAUTION).small());
                 }
-                Grid::new("properties").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
-                    for (i, row) in status.rows.iter().enumerate() {
-                        let color = if i == status.row { ACCENT } else { FAINT };
-                        ui.label(RichText::new(row.label).color(color));
-                        let mut value = row.value;
-                        let [low, high] = row.range;
-                        let speed = speed(row);
-                        let drag = DragValue::new(&mut value).speed(speed).range(low..=high);
-                        let drag = drag.max_decimals(decimals(speed));
-                        if ui.add(drag).changed() {
-                            changed.push((row.property, value));
-                        }
-                        ui.end_row();
-                    }
-                });
-                if !status.redone.is_empty() {
-                    ui.label(RichText::new(&status.redone).color(FAINT).small());
-                }
             });
-        },
-    );
+            let source = ScrollSource { drag: false, ..ScrollSource::ALL };
+            let numbers =
+                ScrollArea::vertical().max_height((height - HEAD - FOOT).max(MARGIN)).scroll_source(source);
+            numbers.show(ui, |ui| show_numbers(ui, status, changed));
+            if !status.redone.is_empty() {
+                ui.label(RichText::new(&status.redone).color(FAINT).small());
+            }
+        });
+    });
+    shown.response.rect
+}
+
+fn show_numbers(ui: &mut Ui, status: &EditStatus, changed: &mut Vec<(Property, f64)>) {
+    let id = Id::new("edited row");
+    let before = ui.data(|data| data.get_temp::<(usize, [usize; 2])>(id));
+    let now = (status.row, status.place);
+    ui.data_mut(|data| data.insert_temp(id, now));
+    Grid::new("properties").num_columns(2).min_col_width(NAMES).spacing([12.0, 3.0]).show(ui, |ui| {
+        for (i, row) in status.rows.iter().enumerate() {
+            let color = if i == status.row { ACCENT } else { FAINT };
+            let label = ui.label(RichText::new(row.label).color(color));
+            if i == status.row && before != Some(now) {
+                label.scroll_to_me(None);
+            }
+            // No number is "-0".
+            let mut value = row.value + 0.0;
+            let [low, high] = row.range;
+            let speed = speed(row);
+            let drag = DragValue::new(&mut value).speed(speed).range(low..=high);
+            let drag = drag.max_decimals(decimals(speed));
+            if ui.add_sized([FIELD, ui.spacing().interact_size.y], drag).changed() {
+                changed.push((row.property, value));
+            }
+            ui.end_row();
+        }
+    });
 }
 
 /// What a point of the mouse adds.

@@ -2,8 +2,9 @@
 
 use super::super::instrument::{Graph, Point};
 use super::super::status::{duration, percent};
-use super::card;
+use super::place::Places;
 use super::style::{ACCENT, FAINT, LINE, MARGIN, TRUTH};
+use super::{card, edit};
 use crate::trace::convergence::PowerLaw;
 use egui::{
     Align2, Color32, Context, FontId, Painter, Pos2, Rect, RichText, Sense, Shape, Stroke, pos2, vec2,
@@ -19,11 +20,17 @@ struct Axes {
     errors: RangeInclusive<f64>,
 }
 
-/// Shows the graph in the lower right corner.
-pub fn show(context: &Context, graph: &Graph) {
+/// Shows the graph in the lower right corner, where no other card is, beside that of what `is_edited`.
+pub fn show(context: &Context, graph: &Graph, is_edited: bool, places: &Places) -> Rect {
     let room = context.content_rect().size();
     let size = vec2(room.x * 0.36, room.y * 0.42).clamp(vec2(150.0, 100.0), vec2(420.0, 280.0));
-    card(context, "graph", Align2::RIGHT_BOTTOM, vec2(-MARGIN, -MARGIN), |ui| {
+    let beside = (Align2::RIGHT_BOTTOM, vec2(-edit::WIDTH - 2.0 * MARGIN, -MARGIN));
+    let corner = (Align2::RIGHT_BOTTOM, vec2(-MARGIN, -MARGIN));
+    let edge = places.room.right();
+    let top = (Align2::RIGHT_TOP, vec2(-MARGIN, places.reach(edge - size.x, edge, true)));
+    let corners =
+        [if is_edited { beside } else { corner }, corner, (Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN)), top];
+    card(context, "graph", places.find(context, "graph", &corners), |ui| {
         ui.horizontal(|ui| {
             ui.label(RichText::new("noise over time").color(ACCENT).small());
             if graph.current.iter().any(|point| point.error.is_some()) {
@@ -40,7 +47,7 @@ pub fn show(context: &Context, graph: &Graph) {
         let rect = response.rect;
         let inner = Rect::from_min_max(rect.min + vec2(34.0, 4.0), rect.max - vec2(6.0, 16.0));
         plot(&painter, Axes::of(graph, inner), graph);
-    });
+    })
 }
 
 /// Where a value lies, in decades.

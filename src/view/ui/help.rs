@@ -57,7 +57,7 @@ impl Help {
         self.pages = pages.len();
         let page = page.min(self.pages - 1);
         self.page = Some(page);
-        card(context, "help", Align2::CENTER_CENTER, vec2(0.0, 0.0), |ui| {
+        card(context, "help", (Align2::CENTER_CENTER, vec2(0.0, 0.0)), |ui| {
             ui.horizontal_top(|ui| {
                 ui.spacing_mut().item_spacing.x = size * 2.0;
                 for column in &pages[page] {

@@ -4,11 +4,11 @@ use super::super::pixel_view::Legend;
 use super::card;
 use super::style::{FAINT, MARGIN};
 use crate::report::false_color::COLORS;
-use egui::{Align2, Color32, Context, Mesh, RichText, Sense, Shape, Ui, pos2, vec2};
+use egui::{Align2, Color32, Context, Mesh, Rect, RichText, Sense, Shape, Ui, pos2, vec2};
 
 /// Shows the legend in the upper right corner.
-pub fn show(context: &Context, legend: &Legend) {
-    card(context, "legend", Align2::RIGHT_TOP, vec2(-MARGIN, MARGIN), |ui| {
+pub fn show(context: &Context, legend: &Legend) -> Rect {
+    card(context, "legend", (Align2::RIGHT_TOP, vec2(-MARGIN, MARGIN)), |ui| {
         ui.label(legend.title);
         if let Some([low, high]) = &legend.range {
             ui.horizontal(|ui| {
@@ -17,7 +17,7 @@ pub fn show(context: &Context, legend: &Legend) {
                 ui.label(RichText::new(high).color(FAINT).small());
             });
         }
-    });
+    })
 }
 
 const GREYS: [[u8; 3]; 2] = [[35; 3], [255; 3]];

@@ -7,6 +7,7 @@ pub mod help;
 pub mod legend;
 pub mod open;
 pub mod paint;
+mod place;
 pub mod report;
 pub mod strip;
 pub mod style;
@@ -17,12 +18,14 @@ use super::edit::property::Property;
 use super::keymap::Keymap;
 use super::status::{Level, Measured, Status, altered};
 use egui::{
-    Align2, Area, Context, Event, Id, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, RichText,
-    ViewportId, pos2, vec2,
+    Align2, Area, Context, Event, Id, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, RawInput, Rect,
+    RichText, ViewportId, pos2, vec2,
 };
 use glam::{DVec2, UVec2};
 use paint::Painter;
+use place::{Place, Places};
 use std::time::Instant;
+use style::{ACCENT, MARGIN};
 use winit::event::MouseButton;
 use winit::keyboard::KeyCode;
 
@@ -106,13 +109,17 @@ impl Ui {
         input.viewports.entry(ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
         let context = self.context.clone();
         let again = RawInput { events: Vec::new(), ..input.clone() };
+        let mut before = rects(&context);
         let mut output = context.run(input, |context| self.show(context, content));
         self.painter.update(&output.textures_delta);
-        // A new card is measured first, and drawn the next time: which is now, for a picture at rest has no next.
-        for _ in 0..2 {
-            if !context.has_requested_repaint() {
+        // A new card is measured first, and drawn the next time: which is now, for a picture at rest has no next. So is what
+        // has to make room for one that has become larger.
+        for _ in 0..3 {
+            let now = rects(&context);
+            if now == before && !context.has_requested_repaint() {
                 break;
             }
+            before = now;
             output = context.run(again.clone(), |context| self.show(context, content));
             self.painter.update(&output.textures_delta);
         }
@@ -138,7 +145,10 @@ impl Ui {
         if pressed && !over {
             self.let_go();
         }
-        if button != MouseButton::Left || !(over || self.context.is_using_pointer()) {
+        if button != MouseButton::Left {
+            return pressed && over;
+        }
+        if !(over || self.context.is_using_pointer()) {
             return false;
         }
         let button = PointerButton::Primary;
@@ -161,8 +171,23 @@ impl Ui {
         self.context.wants_keyboard_input()
     }
 
-    /// Something is typed into a card.
-    pub fn key(&mut self, code: KeyCode, text: Option<&str>) {
+    /// Something is put into a card.
+    pub fn paste(&mut self, text: String) {
+        self.events.push(Event::Paste(text));
+    }
+
+    /// The wheel was turned. Whether it was meant for a card.
+    pub fn wheel(&mut self, notches: f64) -> bool {
+        let is_over = self.context.is_pointer_over_area();
+        if is_over {
+            let (unit, delta) = (MouseWheelUnit::Line, vec2(0.0, notches as f32));
+            self.events.push(Event::MouseWheel { unit, delta, modifiers: Modifiers::NONE });
+        }
+        is_over
+    }
+
+    /// Something is typed into a card, Ctrl being down or not.
+    pub fn key(&mut self, code: KeyCode, text: Option<&str>, control: bool) {
         let key = match code {
             KeyCode::Enter | KeyCode::NumpadEnter => Some(Key::Enter),
             KeyCode::Escape => Some(Key::Escape),
@@ -171,6 +196,10 @@ impl Ui {
             KeyCode::ArrowLeft => Some(Key::ArrowLeft),
             KeyCode::ArrowRight => Some(Key::ArrowRight),
             KeyCode::Tab => Some(Key::Tab),
+            KeyCode::Home => Some(Key::Home),
+            KeyCode::End => Some(Key::End),
+            KeyCode::KeyA if control => Some(Key::A),
+            KeyCode::KeyZ if control => Some(Key::Z),
             _ => None,
         };
         match (key, text) {
@@ -179,10 +208,10 @@ impl Ui {
                 physical_key: None,
                 pressed: true,
                 repeat: false,
-                modifiers: Modifiers::NONE,
+                modifiers: if control { Modifiers::COMMAND } else { Modifiers::NONE },
             }),
-            (None, Some(text)) => self.events.push(Event::Text(text.to_owned())),
-            (None, None) => {}
+            (None, Some(text)) if !control => self.events.push(Event::Text(text.to_owned())),
+            (None, _) => {}
         }
     }
 
@@ -205,22 +234,11 @@ impl Ui {
     }
 
     fn show(&mut self, context: &Context, content: &Content) {
-        if let Some(status) = content.status {
-            if self.level != Level::None {
-                strip::show(context, status, content.measured, self.level);
-            } else if let Some(text) = altered(status) {
-                strip::show_altered(context, &text);
-            }
-            if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None) {
-                legend::show(context, legend);
-            }
-            debug::show(context, &status.debug);
-            if let Some(edited) = &status.edit {
-                edit::show(context, edited, &mut self.edits);
-            }
-            if self.graph {
-                graph::show(context, &status.graph);
-            }
+        let mut places = Places::new(context);
+        // What is read covers the rest, and is alone then.
+        let reads = self.help.is_open() || self.report;
+        if let Some(status) = content.status.filter(|_| !reads) {
+            self.show_cards(context, status, content, &mut places);
         }
         if let Some(status) = content.status.filter(|_| self.report) {
             report::show(context, &status.card);
@@ -228,206 +246,77 @@ impl Ui {
         if let Some(prompt) = &self.prompt {
             open::show(context, prompt);
         }
-        if let Some((name, part)) = content.compared {
-            // Below the status, also where that is as wide as the window.
-            card(context, "compared", Align2::CENTER_TOP, vec2(0.0, 7.0 * style::MARGIN), |ui| {
-                ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
-                let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
-                ui.label(RichText::new(text).color(style::ACCENT));
-            });
-        }
         if let Some(text) = content.loading {
-            card(context, "loading", Align2::CENTER_CENTER, vec2(0.0, 0.0), |ui| {
+            card(context, "loading", (Align2::CENTER_CENTER, vec2(0.0, 0.0)), |ui| {
                 ui.label(RichText::new(text).size(16.0));
             });
         }
         self.help.show(context, content.keys, content.letters);
         if !content.notice.is_empty() {
-            card(context, "notice", Align2::CENTER_BOTTOM, vec2(0.0, -style::MARGIN), |ui| {
-                ui.set_max_width(context.content_rect().width() - 6.0 * style::MARGIN);
+            let at = |anchor, y| (anchor, vec2(0.0, y));
+            let (left, right) = (places.room.left(), places.room.right());
+            let above = at(Align2::CENTER_BOTTOM, -places.reach(left, right, false));
+            let below = at(Align2::CENTER_TOP, places.reach(left, right, true));
+            let bottom = at(Align2::CENTER_BOTTOM, -MARGIN);
+            let place = places.find(context, "notice", &[bottom, above, below]);
+            card(context, "notice", place, |ui| {
+                ui.set_max_width(places.room.width() - 6.0 * MARGIN);
                 ui.label(content.notice);
             });
         }
     }
+
+    /// Whatever is open about the picture, what matters most first.
+    fn show_cards(&mut self, context: &Context, status: &Status, content: &Content, places: &mut Places) {
+        let is_asked = status.edit.is_some() || status.debug.is_open() || self.graph;
+        let has_room = places.is_roomy() || !is_asked;
+        if self.level != Level::None && has_room {
+            places.take(strip::show(context, status, content.measured, self.level));
+        } else if let Some(text) = altered(status) {
+            places.take(strip::show_altered(context, &text));
+        }
+        if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None && has_room) {
+            places.take(legend::show(context, legend));
+        }
+        if let Some((name, part)) = content.compared {
+            // Below the status, also where that is as wide as the window.
+            let (left, right) = (places.room.center().x - 60.0, places.room.center().x + 60.0);
+            let place = (Align2::CENTER_TOP, vec2(0.0, places.reach(left, right, true)));
+            places.take(card(context, "compared", place, |ui| {
+                ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
+                let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
+                ui.label(RichText::new(text).color(ACCENT));
+            }));
+        }
+        let is_edited = status.edit.is_some() && (places.is_roomy() || !status.debug.is_open());
+        if let Some(card) = debug::show(context, &status.debug, places).filter(|_| places.is_roomy()) {
+            places.take(card);
+        }
+        if self.graph && (places.is_roomy() || !(is_edited || status.debug.is_open())) {
+            places.take(graph::show(context, &status.graph, is_edited, places));
+        }
+        if let Some(edited) = status.edit.as_ref().filter(|_| is_edited) {
+            places.take(edit::show(context, edited, places, &mut self.edits));
+        }
+    }
 }
 
-/// A translucent card with rounded corners.
+/// Where the cards are that may be in each other's way.
+fn rects(context: &Context) -> [Option<Rect>; 8] {
+    let names = ["status", "altered", "legend", "compared", "debug", "graph", "edit", "notice"];
+    context.memory(|memory| names.map(|name| memory.area_rect(Id::new(name))))
+}
+
+/// A translucent card with rounded corners; returns where it is.
 pub fn card(
     context: &Context,
     name: &str,
-    anchor: Align2,
-    offset: egui::Vec2,
+    (anchor, offset): Place,
     content: impl FnOnce(&mut egui::Ui),
-) {
-    Area::new(Id::new(name)).anchor(anchor, offset).fade_in(false).interactable(false).show(context, |ui| {
-        style::frame().show(ui, content);
-    });
+) -> Rect {
+    let area = Area::new(Id::new(name)).anchor(anchor, offset).fade_in(false).interactable(false);
+    area.show(context, |ui| style::frame().show(ui, content)).response.rect
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::edit::EditStatus;
-    use super::super::edit::property::Row;
-    use super::super::status::tests::status;
-    use super::*;
-    use std::sync::Arc;
-
-    fn drawn(size: UVec2, display: f64, change: impl FnOnce(&mut Ui), background: u8) -> Vec<u8> {
-        let (status, keys, letters) = (status(), Keymap::default(), Letters::default());
-        let content = Content {
-            status: Some(&status),
-            measured: Measured::default(),
-            loading: None,
-            notice: "saved cornell_1.png",
-            compared: None,
-            keys: &keys,
-            letters: &letters,
-        };
-        let mut ui = Ui::default();
-        change(&mut ui);
-        let mut rgba = vec![background; size.element_product() as usize * 4];
-        ui.draw(&mut rgba, size, display, &content);
-        rgba
-    }
-
-    #[test]
-    fn text_is_light_on_dark_over_any_background() {
-        let size = UVec2::new(640, 360);
-        for background in [0, 128, 255] {
-            let rgba = drawn(size, 1.0, |_| {}, background);
-            let changed = rgba.chunks_exact(4).filter(|p| p[0] != background);
-            let (dark, light) = changed.fold((0, 0), |(dark, light), p| {
-                (dark + usize::from(p[1] < 90), light + usize::from(p[1] > 200))
-            });
-            assert!(dark > 4000 && light > 200, "on {background}: {dark} dark, {light} light");
-        }
-    }
-
-    #[test]
-    fn everything_goes_into_a_window_of_any_size_on_any_display() {
-        for (width, height) in [(1, 1), (3, 200), (200, 3), (40, 30), (321, 241), (1920, 1080)] {
-            for display in [0.0, 1.0, 1.25, 2.0, 3.5] {
-                let open = |ui: &mut Ui| {
-                    ui.help.turn();
-                    (ui.graph, ui.level) = (true, Level::All);
-                    (ui.report, ui.prompt) = (true, Some(open::Prompt::new("")));
-                };
-                drawn(UVec2::new(width, height), display, open, 90);
-            }
-        }
-    }
-
-    #[test]
-    fn every_page_of_the_help_is_inside_the_window() {
-        let (keys, letters) = (Keymap::default(), Letters::default());
-        let content = Content {
-            status: None,
-            measured: Measured::default(),
-            loading: None,
-            notice: "",
-            compared: None,
-            keys: &keys,
-            letters: &letters,
-        };
-        for (width, height, most) in
-            [(1920, 1080, 1), (960, 540, 1), (640, 400, 4), (320, 240, 8), (200, 600, 8)]
-        {
-            let mut ui = Ui { level: Level::None, ..Ui::default() };
-            let mut pages = 0;
-            ui.help.turn();
-            while ui.help.is_open() {
-                let mut rgba = Vec::new();
-                for _ in 0..2 {
-                    rgba = vec![90; (4 * width * height) as usize];
-                    ui.draw(&mut rgba, UVec2::new(width, height), 1.0, &content);
-                }
-                let drawn = |x: u32, y: u32| rgba[(4 * (y * width + x)) as usize] != 90;
-                let rim = (0..width).any(|x| drawn(x, 0) || drawn(x, height - 1))
-                    || (0..height).any(|y| drawn(0, y) || drawn(width - 1, y));
-                assert!(!rim, "page {pages} in {width}x{height} is cut");
-                assert!(drawn(width / 2, height / 2));
-                pages += 1;
-                ui.help.turn();
-            }
-            assert!((1..=most).contains(&pages), "{pages} pages in {width}x{height}");
-        }
-    }
-
-    #[test]
-    fn nothing_is_drawn_if_nothing_is_wanted() {
-        let (keys, letters) = (Keymap::default(), Letters::default());
-        let content = Content {
-            status: Some(&status()),
-            measured: Measured::default(),
-            loading: None,
-            notice: "",
-            compared: None,
-            keys: &keys,
-            letters: &letters,
-        };
-        let mut ui = Ui { level: Level::None, ..Ui::default() };
-        assert!(ui.is_bare(&content));
-        let mut rgba = vec![77; 100 * 100 * 4];
-        ui.draw(&mut rgba, UVec2::splat(100), 1.0, &content);
-        assert!(rgba.iter().all(|&c| c == 77));
-        // But never a picture that is more than the film, as if it were not.
-        let smoothed = Status { smoothed: true, ..status() };
-        let content = Content { status: Some(&smoothed), ..content };
-        assert!(!ui.is_bare(&content));
-        ui.draw(&mut rgba, UVec2::splat(100), 1.0, &content);
-        let changed = rgba.iter().filter(|&&c| c != 77).count() / 4;
-        assert!((100..5000).contains(&changed), "{changed} pixels");
-    }
-
-    #[test]
-    fn the_same_twice_is_the_same_to_the_bit() {
-        let size = UVec2::new(960, 540);
-        let open = |ui: &mut Ui| ui.help.turn();
-        assert_eq!(drawn(size, 1.0, open, 50), drawn(size, 1.0, open, 50));
-    }
-    #[test]
-    fn a_click_into_the_picture_takes_the_keyboard_from_the_card() {
-        let mut status = status();
-        let row = |i| Row {
-            property: Property::Position(i),
-            label: "x",
-            value: 1.0,
-            step: 0.1,
-            grows: false,
-            range: [-1e3, 1e3],
-        };
-        let edited = EditStatus { rows: (0..3).map(row).collect(), ..EditStatus::default() };
-        status.edit = Some(Arc::new(edited));
-        let (keys, letters) = (Keymap::default(), Letters::default());
-        let content = Content {
-            status: Some(&status),
-            measured: Measured::default(),
-            loading: None,
-            notice: "",
-            compared: None,
-            keys: &keys,
-            letters: &letters,
-        };
-        let size = UVec2::new(640, 400);
-        let mut ui = Ui::default();
-        let mut frame = |ui: &mut Ui| ui.draw(&mut vec![0; 640 * 400 * 4], size, 1.0, &content);
-        let click = |ui: &mut Ui, frame: &mut dyn FnMut(&mut Ui), at: DVec2| {
-            let mut taken = false;
-            for pressed in [true, false] {
-                ui.pointer(at, (1.0, size));
-                taken |= ui.button(MouseButton::Left, pressed);
-                frame(ui);
-            }
-            taken
-        };
-        frame(&mut ui);
-        // Wherever on the card the numbers are.
-        let mut down = (0..40).map(|i| DVec2::new(600.0, 100.0 + 5.0 * f64::from(i)));
-        assert!(down.any(|at| click(&mut ui, &mut frame, at) && ui.takes_text()), "no number takes text");
-        ui.key(KeyCode::Digit7, Some("7"));
-        frame(&mut ui);
-        assert!(!click(&mut ui, &mut frame, DVec2::new(50.0, 300.0)), "the picture gets it as well");
-        assert!(!ui.takes_text());
-        assert_eq!(ui.edits.last().map(|(_, value)| *value), Some(7.0), "what was typed counts");
-    }
-}
+mod tests;

@@ -2,6 +2,7 @@
 
 use super::card;
 use super::style::{ACCENT, BRIGHT, FAINT};
+use crate::load::built_in_scenes;
 use egui::{Align2, Context, FontId, RichText, vec2};
 use std::path::{Path, PathBuf};
 use winit::keyboard::KeyCode;
@@ -44,7 +45,7 @@ impl Prompt {
         match code {
             KeyCode::Escape => return Typed::Nothing,
             KeyCode::Enter | KeyCode::NumpadEnter if self.text.is_empty() => return Typed::Nothing,
-            KeyCode::Enter | KeyCode::NumpadEnter => return Typed::Open(PathBuf::from(&self.text)),
+            KeyCode::Enter | KeyCode::NumpadEnter => return Typed::Open(PathBuf::from(at_home(&self.text))),
             KeyCode::Backspace => drop(self.text.pop()),
             KeyCode::Tab => self.complete(),
             _ => self.text.extend(text.unwrap_or("").chars().filter(|c| !c.is_control())),
@@ -77,7 +78,8 @@ impl Prompt {
     /// Finds the names that go on as it does.
     fn look(&mut self) {
         let (folder, typed) = self.parts();
-        let here = if folder.is_empty() { Path::new(".") } else { Path::new(folder) };
+        let folder = at_home(folder);
+        let here = if folder.is_empty() { Path::new(".") } else { Path::new(&folder) };
         let entries = std::fs::read_dir(here).into_iter().flatten().flatten().take(10_000);
         let mut names: Vec<String> = entries
             .filter_map(|entry| {
@@ -94,13 +96,34 @@ impl Prompt {
             })
             .collect();
         names.sort();
+        if folder.is_empty() {
+            // Those that need no file.
+            names.extend(
+                built_in_scenes()
+                    .iter()
+                    .map(|scene| scene.name)
+                    .filter(|name| name.starts_with(typed))
+                    .map(str::to_owned),
+            );
+        }
         self.names = names;
+    }
+}
+
+/// `~/` is the user's own folder.
+fn at_home(text: &str) -> String {
+    let rest = text.strip_prefix('~').filter(|rest| rest.starts_with(std::path::is_separator));
+    let home = std::env::var("HOME").or_else(|_| std::env::var("USERPROFILE"));
+    match (rest, home) {
+        (Some(rest), Ok(home)) => format!("{home}{rest}"),
+        _ => text.to_owned(),
     }
 }
 
 /// Shows the line and what it could become.
 pub fn show(context: &Context, prompt: &Prompt) {
-    card(context, "open", Align2::CENTER_TOP, vec2(0.0, context.content_rect().height() * 0.2), |ui| {
+    let place = (Align2::CENTER_TOP, vec2(0.0, context.content_rect().height() * 0.2));
+    card(context, "open", place, |ui| {
         ui.set_min_width(context.content_rect().width() * 0.5);
         ui.label(
             RichText::new("open a scene or a sky (Tab completes, Enter opens, Esc closes)")
@@ -146,5 +169,12 @@ mod tests {
         assert_eq!(prompt.key(KeyCode::Escape, None), Typed::Nothing);
         std::fs::remove_dir_all(&folder).unwrap();
         assert_eq!(Prompt::default().key(KeyCode::Enter, None), Typed::Nothing);
+        // Where scenes are compiled in, and the user's own folder.
+        assert!(Prompt::new("corn").names.iter().any(|name| name == "cornell"));
+        if let Ok(home) = std::env::var("HOME") {
+            let typed = Prompt::new("~/a.glb").key(KeyCode::Enter, None);
+            assert_eq!(typed, Typed::Open(Path::new(&home).join("a.glb")));
+        }
+        assert_eq!(at_home("a~/b"), "a~/b");
     }
 }

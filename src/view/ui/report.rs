@@ -13,7 +13,7 @@ pub fn show(context: &Context, text: &str) {
     let lines: Vec<&str> = text.lines().collect();
     let shown = lines.len().min(MOST_LINES);
     let size = (room.y * 0.9 / (shown as f32 * 1.7 + 2.0)).clamp(6.0, 13.0);
-    card(context, "report", Align2::CENTER_CENTER, vec2(0.0, 0.0), |ui| {
+    card(context, "report", (Align2::CENTER_CENTER, vec2(0.0, 0.0)), |ui| {
         ui.set_max_width(room.x * 0.86);
         for (i, line) in lines[..shown].iter().enumerate() {
             let color = match line.trim_start().split(' ').next() {

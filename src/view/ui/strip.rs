@@ -3,18 +3,18 @@
 use super::super::status::{Cell, Level, Measured, Status, caution, details, headline, machine};
 use super::card;
 use super::style::{BRIGHT, CAUTION, FAINT, MARGIN};
-use egui::{Align2, Context, Grid, RichText, Ui, vec2};
+use egui::{Align2, Context, Grid, Rect, RichText, Ui, vec2};
 
 /// What has to be told although nothing is to be shown.
-pub fn show_altered(context: &Context, text: &str) {
-    card(context, "altered", Align2::LEFT_TOP, vec2(MARGIN, MARGIN), |ui| {
+pub fn show_altered(context: &Context, text: &str) -> Rect {
+    card(context, "altered", (Align2::LEFT_TOP, vec2(MARGIN, MARGIN)), |ui| {
         ui.label(RichText::new(text).color(CAUTION).small());
-    });
+    })
 }
 
 /// Shows the strip, and as much of the rest as `level` wants.
-pub fn show(context: &Context, status: &Status, measured: Measured, level: Level) {
-    card(context, "status", Align2::LEFT_TOP, vec2(MARGIN, MARGIN), |ui| {
+pub fn show(context: &Context, status: &Status, measured: Measured, level: Level) -> Rect {
+    card(context, "status", (Align2::LEFT_TOP, vec2(MARGIN, MARGIN)), |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 18.0;
             for cell in headline(status) {
@@ -41,7 +41,7 @@ pub fn show(context: &Context, status: &Status, measured: Measured, level: Level
                 }
             });
         }
-    });
+    })
 }
 
 fn show_cell(ui: &mut Ui, cell: &Cell) {

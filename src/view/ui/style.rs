@@ -1,7 +1,8 @@
 //! One look for all cards.
 
 use egui::{
-    Color32, Context, CornerRadius, FontFamily, FontId, Frame, Margin, Stroke, TextStyle, Visuals, vec2,
+    Color32, Context, CornerRadius, FontFamily, FontId, Frame, Margin, Stroke, TextStyle, Visuals,
+    style::ScrollAnimation, vec2,
 };
 
 /// Between cards and the border, points.
@@ -39,6 +40,7 @@ pub fn apply(context: &Context) {
     context.set_visuals(visuals);
     context.style_mut(|style| {
         style.animation_time = 0.0;
+        style.scroll_animation = ScrollAnimation::none();
         style.spacing.item_spacing = vec2(8.0, 4.0);
         let proportional = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles.insert(TextStyle::Body, proportional(13.0));
