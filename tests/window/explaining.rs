@@ -133,7 +133,7 @@ fn cards_are_where_they_belong_and_their_keys_and_escape_close_them() {
             });
             watched.keys(&[close]);
             // In a small window the help has pages, which its key turns.
-            for _ in 0..if covered == 4 && close == key && key != "l" { 3 } else { 0 } {
+            for _ in 0..if covered == 4 && close == key && key != "l" { 6 } else { 0 } {
                 pause(500);
                 if shot() != plain {
                     watched.keys(&[close]);

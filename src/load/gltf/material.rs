@@ -4,7 +4,7 @@ use super::Document;
 use super::layers::{self, Extensions};
 use super::texture::{Textures, uses};
 use crate::load::error::LoadError;
-use crate::load::report::Sink;
+use crate::load::report::{Kind, Sink};
 use crate::load::settings::Materials;
 use crate::scene::{Alpha, Encoding, Glossy, Material, NormalMap};
 use bevy_ecs::name::Name;
@@ -122,6 +122,12 @@ fn convert(
     let strength = extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength.0);
     let emission = if unlit { Vec3::ZERO } else { Vec3::from(material.emissive_factor.0) * strength };
     let passes_light = layers.as_ref().is_some_and(|layers| layers.transmission.is_some());
+    if layers.as_ref().and_then(|layers| layers.transmission.as_ref()).is_some_and(|t| t.body.is_none()) {
+        let what =
+            "transmission without a thickness (KHR_materials_volume): a thin pane, which bends no light"
+                .to_owned();
+        sink.remark(Kind::Decided, document.file, &format!("material `{name}`"), what, 1);
+    }
     if material.alpha_mode == Checked::Invalid {
         sink.repaired(document.file, &format!("material `{name}`"), "unknown alphaMode, opaque instead");
     }

@@ -7,7 +7,7 @@ use super::style::{ACCENT, FAINT, LINE, MARGIN, TRUTH};
 use super::{card, edit};
 use crate::trace::convergence::PowerLaw;
 use egui::{
-    Align2, Color32, Context, FontId, Painter, Pos2, Rect, RichText, Sense, Shape, Stroke, pos2, vec2,
+    Align2, Color32, Context, FontId, Painter, Pos2, Rect, RichText, Sense, Shape, Stroke, Vec2, pos2, vec2,
 };
 use std::ops::RangeInclusive;
 
@@ -20,10 +20,20 @@ struct Axes {
     errors: RangeInclusive<f64>,
 }
 
+/// Size of the plot in a window.
+fn plotted(room: Rect) -> Vec2 {
+    vec2(room.width() * 0.36, room.height() * 0.42).clamp(vec2(150.0, 100.0), vec2(420.0, 280.0))
+}
+
+/// About how high the whole card is, with what is around the plot.
+#[must_use]
+pub fn height(room: Rect) -> f32 {
+    plotted(room).y + 45.0
+}
+
 /// Shows the graph in the lower right corner, where no other card is, beside that of what `is_edited`.
 pub fn show(context: &Context, graph: &Graph, is_edited: bool, places: &Places) -> Rect {
-    let room = context.content_rect().size();
-    let size = vec2(room.x * 0.36, room.y * 0.42).clamp(vec2(150.0, 100.0), vec2(420.0, 280.0));
+    let size = plotted(places.room);
     let beside = (Align2::RIGHT_BOTTOM, vec2(-edit::WIDTH - 2.0 * MARGIN, -MARGIN));
     let corner = (Align2::RIGHT_BOTTOM, vec2(-MARGIN, -MARGIN));
     let edge = places.room.right();

@@ -9,7 +9,7 @@ use egui::{Align2, Context, FontId, Grid, RichText, Ui, Vec2, vec2};
 /// Lines that a section takes beside its rows.
 const HEADING_LINES: usize = 2;
 /// Points of letters that can still be read.
-const LEGIBLE: f32 = 7.0;
+const LEGIBLE: f32 = 9.5;
 /// Height of a line and width of the widest column, over the size of letters.
 const LINE: f32 = 1.62;
 const COLUMN: f32 = 42.0;

@@ -254,7 +254,8 @@ impl Ui {
         self.help.show(context, content.keys, content.letters);
         if !content.notice.is_empty() {
             let at = |anchor, y| (anchor, vec2(0.0, y));
-            let (left, right) = (places.room.left(), places.room.right());
+            let width = places.size_of(context, "notice").x;
+            let (left, right) = (places.room.center().x - 0.5 * width, places.room.center().x + 0.5 * width);
             let above = at(Align2::CENTER_BOTTOM, -places.reach(left, right, false));
             let below = at(Align2::CENTER_TOP, places.reach(left, right, true));
             let bottom = at(Align2::CENTER_BOTTOM, -MARGIN);
@@ -292,7 +293,10 @@ impl Ui {
         if let Some(card) = debug::show(context, &status.debug, places).filter(|_| places.is_roomy()) {
             places.take(card);
         }
-        if self.graph && (places.is_roomy() || !(is_edited || status.debug.is_open())) {
+        // With both others open, it must leave room for the numbers.
+        let room = places.room.height() - graph::height(places.room) - LEAST_NUMBERS;
+        let fits = if is_edited && status.debug.is_open() { room > 0.0 } else { true };
+        if self.graph && fits && (places.is_roomy() || !(is_edited || status.debug.is_open())) {
             places.take(graph::show(context, &status.graph, is_edited, places));
         }
         if let Some(edited) = status.edit.as_ref().filter(|_| is_edited) {
@@ -300,6 +304,9 @@ impl Ui {
         }
     }
 }
+
+/// Height, points, below which a card of numbers is of no use.
+const LEAST_NUMBERS: f32 = 190.0;
 
 /// Where the cards are that may be in each other's way.
 fn rects(context: &Context) -> [Option<Rect>; 8] {

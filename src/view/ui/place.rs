@@ -34,10 +34,16 @@ impl Places {
         self.taken.push(card);
     }
 
+    /// How large a card was last.
+    #[must_use]
+    pub fn size_of(&self, context: &Context, name: &str) -> Vec2 {
+        context.memory(|memory| memory.area_rect(Id::new(name))).map_or(Vec2::ZERO, |rect| rect.size())
+    }
+
     /// The first of `places` where the card `name`, as large as it was last, lies over no other; else the first.
     #[must_use]
     pub fn find(&self, context: &Context, name: &str, places: &[Place]) -> Place {
-        let size = context.memory(|memory| memory.area_rect(Id::new(name))).map_or(Vec2::ZERO, |r| r.size());
+        let size = self.size_of(context, name);
         let free = places.iter().find(|(anchor, offset)| {
             let at = anchor.align_size_within_rect(size, self.room).translate(*offset);
             self.room.contains_rect(at) && !self.taken.iter().any(|card| card.intersects(at))

@@ -61,7 +61,8 @@ fn every_page_of_the_help_is_inside_the_window() {
         keys: &keys,
         letters: &letters,
     };
-    for (width, height, most) in [(1920, 1080, 1), (960, 540, 1), (640, 400, 4), (320, 240, 8), (200, 600, 8)]
+    for (width, height, most) in
+        [(1920, 1080, 1), (960, 540, 2), (640, 400, 4), (320, 240, 12), (200, 600, 12)]
     {
         let mut ui = Ui { level: Level::None, ..Ui::default() };
         let mut pages = 0;
