@@ -3,6 +3,7 @@
 use super::compare::LinearImage;
 use super::develop::Display;
 use super::develop::{develop, develop_image};
+use super::recipe::Recipe;
 use crate::trace::Film;
 use crate::trace::guess::{guessed_blindly, means};
 use glam::{UVec2, Vec3};
@@ -94,6 +95,25 @@ pub fn save_image(path: &Path, image: &LinearImage, display: &Display) -> Result
         PictureFormat::Png => write_png(path, image.size, develop_image(image, display)),
         PictureFormat::Exr => write_exr(path, image.size, &image.pixels),
     }
+}
+
+/// The film as it is shown, as a PNG that knows its `recipe`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_with_recipe(
+    path: &Path,
+    film: &Film,
+    display: &Display,
+    recipe: &Recipe,
+) -> Result<(), ImageError> {
+    let image = LinearImage::of(film);
+    let mut bytes = Vec::new();
+    let rgba = develop_image(&image, display);
+    let broken = |error: png::EncodingError| std::io::Error::other(error.to_string());
+    let io = |source| ImageError::Io { path: path.to_path_buf(), source };
+    super::recipe::write_png(&mut bytes, &rgba, image.size.to_array(), recipe).map_err(|e| io(broken(e)))?;
+    write_whole(path, &bytes)
 }
 
 fn write_png(path: &Path, size: UVec2, rgba: Vec<u8>) -> Result<(), ImageError> {

@@ -66,7 +66,7 @@ pub fn read_arguments(path: &Path) -> Result<Vec<String>, ImageError> {
             chunks.iter().find(|chunk| chunk.keyword == ARGUMENTS).and_then(|chunk| chunk.get_text().ok());
     }
     let text = found.ok_or_else(|| {
-        invalid("doesn't say how it was made: only screenshots of the window (F12) do".into())
+        invalid("doesn't say how it was made: only pictures that the window saves (F12, Ctrl+S) do".into())
     })?;
     serde_json::from_str(&text).map_err(|error| invalid(format!("its recipe is damaged: {error}")))
 }

@@ -204,7 +204,9 @@ pub fn recall(
     for press in &input.taps {
         let Tap::Recall(number) = press.tap else { continue };
         let Some(Some(bookmark)) = bookmarks.0.get(usize::from(number) - 1) else {
-            notices.0.push(Notice::Text(format!("bookmark {number} is empty: Ctrl+Shift+{number} sets it")));
+            notices
+                .0
+                .push(Notice::Text(format!("bookmark {number} is empty: {{set_bookmark_{number}}} sets it")));
             continue;
         };
         navigation.pivot = bookmark.pivot;

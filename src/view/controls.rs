@@ -3,8 +3,10 @@
 use super::flags::{camera_flags, shell_line};
 use super::input::Input;
 use super::keymap::{Hold, Tap};
+use super::recipe::recipe;
 use super::sides::Sides;
 use crate::image::develop::exposure_for;
+use crate::image::files::save_with_recipe;
 use crate::image::{Display, ToneMap, save};
 use crate::open::SceneOrigin;
 use crate::scene::{ActiveCamera, Camera, Filter, GlobalTransform, Lens};
@@ -142,16 +144,13 @@ pub fn change_shown(
 }
 
 /// Saves the film, linear and as it is shown.
-pub fn save_picture(
-    input: Res<Input>,
-    film: Res<Film>,
-    display: Res<Display>,
-    origin: Option<Res<SceneOrigin>>,
-    mut notices: ResMut<Notices>,
-) {
-    if input.count(Tap::SavePicture) == 0 {
+pub fn save_picture(world: &mut World) {
+    if world.resource::<Input>().count(Tap::SavePicture) == 0 {
         return;
     }
+    let recipe = recipe(world);
+    let (film, display) = (world.resource::<Film>(), world.resource::<Display>());
+    let origin = world.get_resource::<SceneOrigin>();
     let stem = origin.map_or_else(|| "scene".to_owned(), |origin| origin.source.name());
     let name = |n: u32, ending: &str| PathBuf::from(format!("{stem}_{n}.{ending}"));
     // Looked for and taken in one: two windows cannot get the same number.
@@ -161,12 +160,13 @@ pub fn save_picture(
                 .map_or_else(|e| e.kind() != ErrorKind::AlreadyExists, |_| true)
     };
     let n = (1..u32::MAX).find(take).unwrap_or(u32::MAX);
-    let saved = ["exr", "png"].map(|ending| save(&name(n, ending), &film, &display));
+    let saved =
+        [save(&name(n, "exr"), film, display), save_with_recipe(&name(n, "png"), film, display, &recipe)];
     let said = match saved.into_iter().find_map(Result::err) {
         None => format!("saved {stem}_{n}.exr and .png"),
         Some(error) => format!("not saved: {error}"),
     };
-    notices.0.push(Notice::Text(said));
+    world.resource_mut::<Notices>().0.push(Notice::Text(said));
 }
 
 /// Pause and resume.

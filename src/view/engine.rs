@@ -391,7 +391,9 @@ fn told_wrong(app: &App) -> String {
     let card = app.world.get_resource::<LoadCard>();
     match card.map_or(0, |card| card.warnings) {
         0 => String::new(),
-        count => format!(": {} loading had to deal with, see the report (L)", counted(count, "thing")),
+        count => {
+            format!(": {} loading had to deal with, see the report ({{report}})", counted(count, "thing"))
+        }
     }
 }
 

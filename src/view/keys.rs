@@ -186,7 +186,7 @@ impl Viewer {
             let is_open = edits || explains || self.compared.split;
             let quit = self.options.keys.label(Tap::Quit, &self.letters).filter(|_| !is_open);
             if let Some(quit) = quit {
-                self.say(format!("{quit} quits"));
+                self.say(&format!("{quit} quits"));
             }
         }
     }

@@ -62,6 +62,8 @@ pub struct ViewOptions {
     pub reference: Option<LinearImage>,
     /// Which keys do what.
     pub keys: keymap::Keymap,
+    /// What to say first.
+    pub notice: String,
     /// What to do, as if a user did it. Then the times from events to pictures are printed.
     pub replay: Option<replay::Replay>,
     /// Where to write down what the user does.

@@ -239,7 +239,7 @@ impl Viewer {
         } else if with_hud {
             screen.bytes().to_vec()
         } else if self.picture.rgba.is_empty() {
-            return self.say("there is no picture yet".to_owned());
+            return self.say("there is no picture yet");
         } else {
             self.take_published();
             let mut bytes = vec![0; size.element_product() as usize * 4];

@@ -126,16 +126,20 @@ pub fn change_sides(
                     Kept::Colors(picture.clone())
                 });
                 sides.prefers_reference = false;
-                "kept: hold K to see it, Shift+K for both"
+                "kept: hold {compare} to see it, {split} for both"
             }
             Tap::OtherSide if has == (true, true) => {
                 sides.prefers_reference = !sides.prefers_reference;
-                if sides.prefers_reference { "K: the reference" } else { "K: the kept picture" }
+                if sides.prefers_reference {
+                    "{compare}: the reference"
+                } else {
+                    "{compare}: the kept picture"
+                }
             }
             Tap::OtherSide if has.0 => "there is no reference (--reference FILE)",
-            Tap::OtherSide if has.1 => "nothing was kept: Ctrl+K keeps this picture",
+            Tap::OtherSide if has.1 => "nothing was kept: {keep} keeps this picture",
             Tap::OtherSide | Tap::Split if !(has.0 || has.1) => {
-                "nothing to compare with: Ctrl+K keeps this picture"
+                "nothing to compare with: {keep} keeps this picture"
             }
             Tap::Split => {
                 sides.split = !sides.split;

@@ -247,7 +247,7 @@ impl Viewer {
         let copied =
             self.clipboard.as_mut().is_some_and(|clipboard| clipboard.set_text(text.clone()).is_ok());
         let is_short = said.is_empty();
-        self.say(match (copied, is_short) {
+        self.say(&match (copied, is_short) {
             (true, true) => format!("copied: {text}"),
             (false, true) => text,
             (true, false) => format!("{said}; the command that renders it is on the clipboard"),
@@ -255,8 +255,9 @@ impl Viewer {
         });
     }
 
-    pub(super) fn say(&mut self, text: String) {
-        self.notice = text;
+    /// Shows `text` for a while, with keys in place of their names: see [`Keymap::fill`](super::keymap::Keymap::fill).
+    pub(super) fn say(&mut self, text: &str) {
+        self.notice = self.options.keys.fill(text, &self.letters);
         self.due.notice = Some(Instant::now() + NOTICE);
         self.redraw();
     }
@@ -293,6 +294,10 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.due.exit = self.options.exit_after.map(|time| Instant::now() + time);
                 self.start_engine();
                 self.send(Command::Resize(size));
+                let notice = std::mem::take(&mut self.options.notice);
+                if !notice.is_empty() {
+                    self.say(&notice);
+                }
                 self.redraw();
             }
             Err(why) => self.fail(event_loop, ViewError::NoDisplay(why)),
@@ -308,7 +313,7 @@ impl ApplicationHandler<Wake> for Viewer {
                 }
                 self.redraw_in_time();
             }
-            Wake::Notice(text) => self.say(text),
+            Wake::Notice(text) => self.say(&text),
             Wake::Copy { said, text } => self.copy(&said, text),
             Wake::Opened { name, folder } => {
                 self.options.folder = folder;

@@ -4,6 +4,7 @@ use crate::headless;
 #[cfg(feature = "view")]
 use crate::{exit, signal::set_threads};
 use penumbra::cli::WindowArgs;
+use penumbra::view::keymap::Keymap;
 #[cfg(feature = "view")]
 use penumbra::{app::FrameBudget, open::open, render::open_reference, shown::Shown, trace::RenderSettings};
 
@@ -25,10 +26,15 @@ pub fn run(args: &WindowArgs) -> u8 {
         Err(error) => return exit::because(&error, exit::SCENE_NOT_READABLE),
     };
     set_threads(args.scene.threads);
-    let keys = match penumbra::view::keys_file::read(args.keys.as_deref()) {
-        Ok(keys) => keys,
+    let (keys, notice) = match penumbra::view::keys_file::read(args.keys.as_deref()) {
+        Ok(keys) => (keys, String::new()),
+        // Whoever named no file may not see what is printed.
+        Err(error) if args.keys.is_none() => (Keymap::default(), format!("the usual keys: {error}")),
         Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
     };
+    if !notice.is_empty() {
+        eprintln!("{notice}");
+    }
     let replay = args.replay.as_deref().map(penumbra::view::replay::Replay::open).transpose();
     let record = args.record.as_deref().map(penumbra::view::replay::Recorder::create).transpose();
     let (replay, record) = match replay.and_then(|replay| Ok((replay, record?))) {
@@ -49,6 +55,7 @@ pub fn run(args: &WindowArgs) -> u8 {
         screenshot_stem: source.name(),
         reference,
         keys,
+        notice,
         replay,
         record,
         exit_after: None,

@@ -79,7 +79,7 @@ pub(super) fn spawn_all(
     } else if !spawned.is_empty() {
         sink.decide(
             document.file,
-            "has animations; stands in its rest pose (--time S shows another, Ctrl+Space plays)",
+            "has animations; stands in its rest pose (--time S shows another, the window plays them)",
         );
     }
     // Another file of the scene may have brought some before.

@@ -158,7 +158,7 @@ fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
     editor.row = 0;
     editor.selected = if editor.selected == found { None } else { found };
     if found.is_none() {
-        say(world, "nothing there to edit: Ctrl+PageDown goes through all there is");
+        say(world, "nothing there to edit: {next_thing} goes through all there is");
     }
 }
 
@@ -188,7 +188,7 @@ fn step(world: &mut World, editor: &mut Editor, steps: f64) {
 /// What is selected; if nothing is, that is said.
 fn selected(world: &mut World, editor: &Editor) -> Option<Selection> {
     if editor.selected.is_none() {
-        say(world, "select something first: M, or Ctrl+PageDown");
+        say(world, "select something first: {select}, or {next_thing}");
     }
     editor.selected
 }

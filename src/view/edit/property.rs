@@ -108,7 +108,7 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         let mut copy = light.clone();
         let all: Vec<Vec3> = spectra(&mut copy).into_iter().map(|s| *s).collect();
         let mean = all.iter().sum::<Vec3>() / all.len().max(1) as f32;
-        add(Property::Power, "power", f64::from(luminance(mean)), 0.1, true, [0.0, 1e12]);
+        add(Property::Power, "strength", f64::from(luminance(mean)), 0.1, true, [0.0, 1e12]);
         let most = f64::from(mean.max_element()).max(1e-30);
         for (channel, label) in AXES[2].into_iter().enumerate() {
             let share = f64::from(mean[channel]) / most;

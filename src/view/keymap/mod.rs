@@ -101,6 +101,28 @@ impl Keymap {
         chords.first().map(|chord| chord.label(letters))
     }
 
+    /// `text` with the key of what is called so in place of each `{name}`: the first that it has.
+    #[must_use]
+    pub fn fill(&self, text: &str, letters: &Letters) -> String {
+        let mut filled = String::with_capacity(text.len());
+        let mut rest = text;
+        while let Some((before, after)) = rest.split_once('{') {
+            filled.push_str(before);
+            let known = after.split_once('}').and_then(|(name, after)| {
+                let (_, chords) = self.0.iter().find(|(entry, _)| entry.name == name)?;
+                Some((chords.first().map_or("no key".to_owned(), |chord| chord.label(letters)), after))
+            });
+            if let Some((key, after)) = known {
+                filled.push_str(&key);
+                rest = after;
+            } else {
+                filled.push('{');
+                rest = after;
+            }
+        }
+        filled + rest
+    }
+
     /// The keys of a row of the help, as the user's keyboard names them.
     #[must_use]
     pub fn keys_of(&self, row: &Row, letters: &Letters) -> String {
@@ -143,6 +165,14 @@ pub fn is_modifier(action: Action) -> bool {
 mod tests {
     use super::*;
     use KeyCode::{Digit1, KeyQ, KeyT, KeyW, ShiftLeft};
+
+    #[test]
+    fn a_hint_names_the_key_that_the_user_has_given() {
+        let keys = super::super::keys_file::parse("keep = 'F9'\nundo = []").unwrap();
+        let filled = |text: &str| keys.fill(text, &Letters::default());
+        assert_eq!(filled("kept: hold {compare}, {keep} keeps"), "kept: hold K, F9 keeps");
+        assert_eq!(filled("{undo} and {what} of a{b"), "no key and {what} of a{b");
+    }
 
     fn action(code: KeyCode, control: bool, shift: bool) -> Option<Action> {
         Keymap::default().lookup(code, control, shift).map(|entry| entry.action)

@@ -45,6 +45,12 @@ impl Prompt {
         match code {
             KeyCode::Escape => return Typed::Nothing,
             KeyCode::Enter | KeyCode::NumpadEnter if self.text.is_empty() => return Typed::Nothing,
+            // Into a folder.
+            KeyCode::Enter | KeyCode::NumpadEnter if Path::new(&at_home(&self.text)).is_dir() => {
+                if !self.text.ends_with(std::path::is_separator) {
+                    self.text.push('/');
+                }
+            }
             KeyCode::Enter | KeyCode::NumpadEnter => return Typed::Open(PathBuf::from(at_home(&self.text))),
             KeyCode::Backspace => drop(self.text.pop()),
             KeyCode::Tab => self.complete(),
