@@ -242,7 +242,11 @@ fn choose_camera(
     };
     let focus = pose.focus_distance.or(lens.map(|l| l.focus)).unwrap_or_else(default_focus);
     let radius = pose.lens_radius.or(lens.map(|l| l.radius)).unwrap_or(0.0);
+    let aspect = from.and_then(|camera| world.get::<Aspect>(camera)).copied();
     let entity = world.spawn((camera, transform, Name::new("command line"))).id();
+    if let Some(aspect) = aspect {
+        world.entity_mut(entity).insert(aspect);
+    }
     if radius > 0.0 {
         world.entity_mut(entity).insert(Lens { radius, focus });
     }

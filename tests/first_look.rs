@@ -1,9 +1,11 @@
 //! What is decided by a small picture of the scene: light and exposure.
 
+use glam::UVec2;
 use penumbra::image::Display;
 use penumbra::load::{LoadOptions, LoadReport, SceneSource};
-use penumbra::open::{Opened, Wishes, open};
+use penumbra::open::{Opened, Pose, Wishes, open};
 use penumbra::scene::Light;
+use penumbra::trace::RenderSettings;
 use std::path::Path;
 
 fn opened(name: &str, obj: &str, mtl: &str) -> Opened {
@@ -95,4 +97,42 @@ fn a_screen_with_a_black_patch_is_no_dark_scene() {
     let mtl = "newmtl screen\nKd 0 0 0\nKe 1 1 1\nmap_Ke patch.png\n";
     let mut scene = opened("screen", screen, mtl);
     assert_eq!(lights(&mut scene), 0, "{:?}", scene.report.decisions());
+}
+
+/// Composed by its author for a picture of that shape.
+#[test]
+fn the_picture_has_the_shape_that_the_files_camera_asks_for() {
+    let folder = std::env::temp_dir().join(format!("penumbra-shape-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("a.gltf");
+    let size = |camera: &str, wishes: &Wishes| {
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1]}}],
+            "nodes":[{{"camera":0,"translation":[0,0,3]}},{{"mesh":0}}],"cameras":[{{{camera}}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}],
+            "bufferViews":[{{"buffer":0,"byteLength":36}}],
+            "buffers":[{{"byteLength":36,"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}]}}"#
+        );
+        std::fs::write(&file, text).unwrap();
+        let opened = open(&SceneSource::File(file.clone()), &LoadOptions::default(), wishes).unwrap();
+        opened.app.world.resource::<RenderSettings>().size
+    };
+    let perspective =
+        |aspect: &str| format!(r#""type":"perspective","perspective":{{"yfov":0.7,"znear":0.1{aspect}}}"#);
+    let none = Wishes::default();
+    assert_eq!(size(&perspective(""), &none), UVec2::new(960, 540));
+    assert_eq!(size(&perspective(r#","aspectRatio":1.7777777"#), &none), UVec2::new(960, 540));
+    assert_eq!(size(&perspective(r#","aspectRatio":1"#), &none), UVec2::splat(720));
+    assert_eq!(size(&perspective(r#","aspectRatio":0.5"#), &none), UVec2::new(360, 720));
+    assert_eq!(size(&perspective(r#","aspectRatio":-1"#), &none), UVec2::new(960, 540));
+    let flat = r#""type":"orthographic","orthographic":{"xmag":4,"ymag":2,"znear":0,"zfar":9}"#;
+    assert_eq!(size(flat, &none), UVec2::new(1018, 509));
+    // Seen otherwise, it is still that camera; and who asks for a size has it.
+    let pose = Pose { lens_radius: Some(0.01), ..Pose::default() };
+    let wishes = Wishes { pose, ..Wishes::default() };
+    assert_eq!(size(&perspective(r#","aspectRatio":1"#), &wishes), UVec2::splat(720));
+    let wishes = Wishes { size: Some(UVec2::new(64, 48)), ..Wishes::default() };
+    assert_eq!(size(&perspective(r#","aspectRatio":1"#), &wishes), UVec2::new(64, 48));
+    std::fs::remove_dir_all(&folder).unwrap();
 }

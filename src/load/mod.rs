@@ -78,6 +78,14 @@ impl SceneSource {
         Err(builtin::unknown(argument))
     }
 
+    /// Where its file lies, with a separator at its end; empty for what has no file or lies where the program runs.
+    #[must_use]
+    pub fn folder(&self) -> String {
+        let Self::File(path) = self else { return String::new() };
+        let folder = path.parent().map(|folder| folder.to_string_lossy()).unwrap_or_default();
+        if folder.is_empty() { String::new() } else { format!("{folder}{}", std::path::MAIN_SEPARATOR) }
+    }
+
     /// File stem, or name of the built-in scene: for titles and file names.
     #[must_use]
     pub fn name(&self) -> String {
@@ -89,16 +97,6 @@ impl SceneSource {
             // Names of files have no colons on some machines.
             Self::Made(made) => made.name.replace(':', "-"),
         }
-    }
-}
-
-impl SceneSource {
-    /// Where its file lies, with a separator at its end; empty for what has no file or lies where the program runs.
-    #[must_use]
-    pub fn folder(&self) -> String {
-        let Self::File(path) = self else { return String::new() };
-        let folder = path.parent().map(|folder| folder.to_string_lossy()).unwrap_or_default();
-        if folder.is_empty() { String::new() } else { format!("{folder}{}", std::path::MAIN_SEPARATOR) }
     }
 }
 

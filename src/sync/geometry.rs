@@ -71,7 +71,7 @@ pub fn sync_geometry(
         return;
     }
     let mut placed: Vec<_> = instances.iter().collect();
-    placed.sort_unstable_by_key(|(entity, ..)| *entity);
+    placed.sort_unstable_by_key(|(entity, ..)| entity.index_u32());
     let (mut placements, mut data) = (Vec::new(), Vec::new());
     entities.instances.clear();
     for (entity, instance, global) in placed {

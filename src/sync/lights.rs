@@ -34,7 +34,8 @@ pub fn sync_lights(
         return;
     }
     let mut placed: Vec<_> = all.iter().collect();
-    placed.sort_unstable_by_key(|(entity, ..)| *entity);
+    // By index alone: numbers that were used before are no later for that.
+    placed.sort_unstable_by_key(|(entity, ..)| entity.index_u32());
     entities.lights.clear();
     let mut flat: Vec<FlatLight> = Vec::new();
     for (entity, light, global, visible) in placed {

@@ -164,7 +164,12 @@ pub fn save_picture(world: &mut World) {
         [save(&name(n, "exr"), film, display), save_with_recipe(&name(n, "png"), film, display, &recipe)];
     let said = match saved.into_iter().find_map(Result::err) {
         None => format!("saved {stem}_{n}.exr and .png"),
-        Some(error) => format!("not saved: {error}"),
+        Some(error) => {
+            // What took the number.
+            let empty = std::fs::metadata(name(n, "exr")).is_ok_and(|file| file.len() == 0);
+            drop(empty.then(|| std::fs::remove_file(name(n, "exr"))));
+            format!("not saved: {error}")
+        }
     };
     world.resource_mut::<Notices>().0.push(Notice::Text(said));
 }

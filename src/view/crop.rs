@@ -23,7 +23,9 @@ pub fn change_region(
     // The same part of a picture of another size.
     if let (Some([min, max]), Some(size)) = (wanted, input.resize.filter(|&size| size != settings.size)) {
         let part = |at: UVec2| at.as_dvec2() / settings.size.as_dvec2();
-        wanted = region([part(min), part(max)], size);
+        let end = size.max(UVec2::ONE);
+        let least = [min.min(end - 1), min.min(end - 1) + 1];
+        wanted = region([part(min), part(max)], size).or(Some(least));
     }
     for press in input.taps.iter().filter(|press| press.tap == Tap::Crop) {
         *share = if press.shift { (*share + 1) % SHARES.len() } else { *share };
@@ -106,6 +108,29 @@ mod tests {
         assert_eq!(regions[1..4], [around(25, 15), around(25, 15), None]);
         assert_eq!(regions[4], around(25, 15), "the size is remembered");
         assert!(regions[0].is_some());
+    }
+
+    #[test]
+    fn the_region_goes_with_the_picture_through_all_its_sizes() {
+        let mut world = World::new();
+        world.insert_resource(RenderSettings { size: UVec2::new(100, 60), ..RenderSettings::default() });
+        let region = Some([UVec2::new(50, 15), UVec2::new(75, 45)]);
+        world.insert_resource(FrameBudget { region, ..FrameBudget::default() });
+        world.init_resource::<Notices>();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(change_region);
+        let mut resize = |size: UVec2| {
+            let mut input = Input::new(Instant::now());
+            input.resize = Some(size);
+            world.insert_resource(input);
+            schedule.run(&mut world);
+            world.resource_mut::<RenderSettings>().size = size;
+            world.resource::<FrameBudget>().region
+        };
+        assert_eq!(resize(UVec2::new(200, 120)), region.map(|corners| corners.map(|at| at * 2)));
+        assert_eq!(resize(UVec2::new(100, 60)), region);
+        let tiny = resize(UVec2::ONE).unwrap();
+        assert_eq!(tiny, [UVec2::ZERO, UVec2::ONE], "never nothing");
     }
 
     #[test]

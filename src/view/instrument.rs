@@ -4,6 +4,7 @@ use super::controls::{Notice, Notices};
 use super::edit::Editor;
 use crate::app::FrameStats;
 use crate::image::compare::LinearImage;
+use crate::open::SceneOrigin;
 use crate::scene::{Filter, Playing};
 use crate::sync::Redone;
 use crate::trace::convergence::{Convergence, PowerLaw};
@@ -11,6 +12,7 @@ use crate::trace::noise::{part, relative_error};
 use crate::trace::{Film, Integrator, RenderSettings, Viewpoint};
 use bevy_ecs::prelude::*;
 use glam::UVec2;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// One look at a growing picture.
@@ -70,21 +72,29 @@ pub struct Seen {
     max_depth: u32,
     filter: Option<Filter>,
     time: Option<f64>,
+    sky: Option<PathBuf>,
 }
 
 impl Seen {
     /// As it is now.
     #[must_use]
-    pub fn now(editor: Option<&Editor>, settings: &RenderSettings, playing: Option<&Playing>) -> Self {
+    pub fn now(
+        editor: Option<&Editor>,
+        settings: &RenderSettings,
+        playing: Option<&Playing>,
+        origin: Option<&SceneOrigin>,
+    ) -> Self {
         let &RenderSettings { integrator, max_depth, filter, .. } = settings;
         let edits = editor.map_or_else(String::new, |editor| editor.written().to_owned());
-        Self { edits, integrator, max_depth, filter, time: playing.and_then(|playing| playing.time) }
+        let time = playing.and_then(|playing| playing.time);
+        let sky = origin.and_then(|origin| origin.options.sky.clone());
+        Self { edits, integrator, max_depth, filter, time, sky }
     }
 
     /// Of this world.
     #[must_use]
     pub fn of(world: &World) -> Self {
-        Self::now(world.get_resource(), world.resource(), world.get_resource())
+        Self::now(world.get_resource(), world.resource(), world.get_resource(), world.get_resource())
     }
 }
 
@@ -101,7 +111,9 @@ impl Reference {
         match () {
             () if self.image.size != size => Some("the reference has another size: the picture"),
             () if self.viewpoint != *viewpoint => Some("the reference is of another view: the picture"),
-            () if self.seen != *seen => Some("the reference is of the unedited scene: the picture"),
+            () if self.seen != *seen => {
+                Some("the reference is of other settings or other things: the picture")
+            }
             () => None,
         }
     }
@@ -176,7 +188,7 @@ pub fn note_noise(
     film: Res<Film>,
     viewpoint: Res<Viewpoint>,
     settings: Res<RenderSettings>,
-    (editor, playing): (Option<Res<Editor>>, Option<Res<Playing>>),
+    (editor, playing, origin): (Option<Res<Editor>>, Option<Res<Playing>>, Option<Res<SceneOrigin>>),
     mut notices: ResMut<Notices>,
 ) {
     let instrument = instrument.bypass_change_detection();
@@ -199,7 +211,7 @@ pub fn note_noise(
     instrument.noted = stats.noise_samples;
     let seconds = (stats.trace_seconds - instrument.start_seconds).max(1e-6);
     let samples = stats.samples_per_pixel;
-    let seen = || Seen::now(editor.as_deref(), &settings, playing.as_deref());
+    let seen = || Seen::now(editor.as_deref(), &settings, playing.as_deref(), origin.as_deref());
     let reference = instrument.reference.as_ref();
     let error = reference.and_then(|reference| reference.error(&film, &viewpoint, &seen()));
     notices.0.extend(instrument.reference.as_mut().and_then(|reference| reference.complain(film.size())));

@@ -192,7 +192,8 @@ impl Viewer {
     }
 
     pub(super) fn leave(&mut self) {
-        self.keys.0.clear();
+        let held: Vec<KeyCode> = self.keys.0.drain().map(|(code, _)| code).collect();
+        held.into_iter().for_each(|code| self.record(&Event::Key(code, false)));
         self.hold();
         self.end_drag();
     }

@@ -9,6 +9,7 @@ use super::keymap::Tap;
 use crate::app::FrameBudget;
 use crate::image::compare::LinearImage;
 use crate::image::{Display, Picture};
+use crate::open::SceneOrigin;
 use crate::report::false_color::ErrorScale;
 use crate::scene::color::{luminance, srgb_from_linear};
 use crate::scene::{Playing, SceneBounds};
@@ -127,7 +128,7 @@ pub struct Unknown(Option<&'static str>);
 pub fn choose_developed(
     (view, instrument): (Res<PixelView>, Res<Instrument>),
     (viewpoint, settings): (Res<Viewpoint>, Res<RenderSettings>),
-    (editor, playing): (Option<Res<Editor>>, Option<Res<Playing>>),
+    (editor, playing, origin): (Option<Res<Editor>>, Option<Res<Playing>>, Option<Res<SceneOrigin>>),
     film: Res<Film>,
     mut unknown: ResMut<Unknown>,
     mut budget: ResMut<FrameBudget>,
@@ -135,7 +136,7 @@ pub fn choose_developed(
 ) {
     *unknown = Unknown(None);
     if *view == PixelView::Error {
-        let seen = Seen::now(editor.as_deref(), &settings, playing.as_deref());
+        let seen = Seen::now(editor.as_deref(), &settings, playing.as_deref(), origin.as_deref());
         unknown.0 = match &instrument.reference {
             Some(reference) => reference.differs(&viewpoint, &seen, film.size()),
             None => Some("there is no reference: the picture"),

@@ -156,7 +156,11 @@ impl Viewer {
         };
         for event in replay.due(now) {
             match event {
-                Event::Key(code, pressed) => self.key_moved(event_loop, code, pressed, false, false),
+                Event::Key(code, pressed) => {
+                    self.key_moved(event_loop, code, pressed, false, false);
+                    // What was typed into it is told by what it came to.
+                    self.ui.prompt = None;
+                }
                 Event::Drag(drag, x, y) => {
                     self.send(Command::Drag { drag, pixels: DVec2::new(x, y), at: Instant::now() });
                 }

@@ -26,7 +26,10 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// Why it cannot be shown; `app` is as it was then.
 pub fn open_other(app: &App, path: &Path, watcher: Watcher) -> Result<App, String> {
-    let source = SceneSource::parse(&path.to_string_lossy()).map_err(|error| error.to_string())?;
+    let source = match path.to_str() {
+        Some(argument) => SceneSource::parse(argument).map_err(|error| error.to_string())?,
+        None => SceneSource::File(path.to_path_buf()),
+    };
     let settings = app.world.resource::<RenderSettings>();
     let wishes = Wishes {
         size: Some(settings.size),

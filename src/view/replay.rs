@@ -61,7 +61,6 @@ impl Event {
                 let place = |x, y| Ok::<_, String>(DVec2::new(number(x)?, number(y)?));
                 Ok(Self::Region([place(a, b)?, place(c, d)?]))
             }
-            ["open", ref file @ ..] if !file.is_empty() => Ok(Self::Open(PathBuf::from(file.join(" ")))),
             ["quit"] => Ok(Self::Quit),
             _ => Err(format!(
                 "\"{}\" is no event: down, up, drag, wheel, at, click, region, open or quit",
@@ -108,13 +107,19 @@ impl Replay {
             let words: Vec<&str> = line.split('#').next().unwrap_or("").split_whitespace().collect();
             let [time, event @ ..] = words.as_slice() else { continue };
             let wrong = |why: String| format!("line {number}: {why}");
+            // Names of files may be anything.
+            let file = line.trim_start().split_once(" open ").map(|(_, file)| PathBuf::from(file));
             let time: f64 =
                 time.parse().map_err(|_| wrong(format!("\"{time}\" is not a time in seconds")))?;
             let time = Duration::try_from_secs_f64(time).map_err(|error| wrong(error.to_string()))?;
             if events.last().is_some_and(|(last, _)| *last > time) {
                 return Err(wrong("it comes before the one above".to_owned()));
             }
-            events.push((time, Event::parse(event).map_err(wrong)?));
+            let event = match (event, file) {
+                (["open", ..], Some(file)) => Event::Open(file),
+                _ => Event::parse(event).map_err(wrong)?,
+            };
+            events.push((time, event));
         }
         Ok(Self { events, done: 0, start: None })
     }
@@ -182,7 +187,7 @@ mod tests {
             Event::At(DVec2::new(0.25, 0.5)),
             Event::Click,
             Event::Region([DVec2::ZERO, DVec2::new(0.5, 0.75)]),
-            Event::Open(PathBuf::from("two words.glb")),
+            Event::Open(PathBuf::from("two  words #2.glb")),
             Event::Quit,
         ];
         let mut recorder = Recorder::create(&path).unwrap();

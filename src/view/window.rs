@@ -6,6 +6,7 @@ use super::engine::{Engine, Published, Wake};
 use super::input::{Command, Drag};
 use super::keymap::Hold;
 use super::keys::Down;
+use super::replay::Event;
 use super::screen::{Screen, vector};
 use super::sides::Compared;
 use super::status::Status;
@@ -342,7 +343,10 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.redraw();
             }
             WindowEvent::Focused(false) => self.leave(),
-            WindowEvent::DroppedFile(path) => self.send(Command::Open(path)),
+            WindowEvent::DroppedFile(path) => {
+                self.record(&Event::Open(path.clone()));
+                self.send(Command::Open(path));
+            }
             WindowEvent::KeyboardInput { event, is_synthetic, .. } => {
                 self.key(event_loop, &event, is_synthetic);
             }

@@ -2,8 +2,9 @@
 //! something else to everybody else. They are said again in those of the PBR extension.
 //!
 //! Found by exporting materials of known parameters with Blender 5.0, and confirmed in files of 2.8 and 3.6: `Ns` is
-//! (1 − roughness)² times 1000 (900 before 3.1), `Ks` the strength of gloss, 0.5 being that of `Ni`, illum 3 and 6 are metal
-//! by the share that `Ka` says, `Pc` is four times the varnish, and `Tf` is there only for what lets light through.
+//! (1 − roughness)² times 1000 (900 in 2.8; for 3.1 and 3.2 it is taken to be 900 too), `Ks` the strength of gloss, 0.5 being
+//! that of `Ni` (before 4.0 that of an index of 1.5), illum 3 and 6 are metal by the share that `Ka` says, `Pc` is four times
+//! the varnish, and `Tf` is there only for what lets light through. Numbers of what has a map are not written, or mean nothing.
 
 use glam::Vec3;
 
@@ -12,18 +13,29 @@ pub(super) const GLOSS: &str = "Blender gloss";
 /// And how much it lets through.
 pub(super) const THROUGH: &str = "Blender transmission";
 
-/// `Ns` of what is perfectly smooth, before version 3.1.
-const BEFORE_3_1: f32 = 900.0;
+/// Which Blender wrote a library: major and minor number; 0, 0 is before 3.1, which doesn't say.
+pub(super) type Version = (u32, u32);
 
-/// `Ns` of what is perfectly smooth, if Blender wrote the library.
-pub(super) fn smoothest(text: &str) -> Option<f32> {
-    let version = text.lines().next()?.strip_prefix("# Blender ")?;
-    Some(if version.starts_with(|c: char| c.is_ascii_digit()) { 1000.0 } else { BEFORE_3_1 })
+/// The version of Blender that wrote the library, if it was Blender.
+pub(super) fn version(text: &str) -> Option<Version> {
+    let rest = text.lines().next()?.strip_prefix("# Blender ")?;
+    let mut numbers = rest.split(['.', ' ']).map(str::parse);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(major)), Some(Ok(minor))) => Some((major, minor)),
+        _ => Some((0, 0)),
+    }
 }
 
 /// Says again what Blender meant. Whether it did: what people have changed by hand since stays as it is.
-pub(super) fn restate(material: &mut tobj::Material, smoothest: f32) -> bool {
+pub(super) fn restate(material: &mut tobj::Material, version: Version) -> bool {
     let model = material.illumination_model.unwrap_or(2);
+    // It writes no others, and these two only for what has an opacity.
+    let is_clear = material.dissolve.is_none_or(|dissolve| dissolve >= 1.0);
+    if !matches!(model, 0..=3 | 6 | 9)
+        || matches!(model, 6 | 9) && is_clear && material.dissolve_texture.is_none()
+    {
+        return false;
+    }
     let number = |material: &tobj::Material, keyword: &str| -> Option<f32> {
         material.unknown_param.get(keyword)?.split_ascii_whitespace().next()?.parse().ok()
     };
@@ -35,7 +47,7 @@ pub(super) fn restate(material: &mut tobj::Material, smoothest: f32) -> bool {
     let is_metal = matches!(model, 3 | 6);
     let is_black = material.diffuse == Some([0.0; 3]) && material.diffuse_texture.is_none();
     // Before 2.8 there was no such surface, and everything but glass was written with an index of 1.
-    if smoothest == BEFORE_3_1 && !is_pbr && material.optical_density.is_none_or(|ior| ior <= 1.0) {
+    if version == (0, 0) && !is_pbr && material.optical_density.is_none_or(|ior| ior <= 1.0) {
         return false;
     }
     // A mirror that somebody made of it.
@@ -46,18 +58,22 @@ pub(super) fn restate(material: &mut tobj::Material, smoothest: f32) -> bool {
         material.unknown_param.insert(keyword.to_owned(), value.to_string());
     };
     if !is_pbr {
-        if let Some(exponent) = material.shininess {
+        let smoothest = if version < (3, 3) { 900.0 } else { 1000.0 };
+        if let Some(exponent) = material.shininess.filter(|_| material.shininess_texture.is_none()) {
             say("Pr", 1.0 - (exponent / smoothest).clamp(0.0, 1.0).sqrt());
         }
         say("Pm", if is_metal { ambient.x.min(1.0) } else { 0.0 });
     }
-    say(GLOSS, 2.0 * gloss);
+    say(GLOSS, 2.0 * gloss.clamp(0.0, 1.0));
     if let Some(varnish) = number(material, "Pc") {
         material.unknown_param.insert("Pc".to_owned(), (0.25 * varnish).to_string());
     }
     if let Some(through) = number(material, "Tf").filter(|&through| through > 0.0) {
         material.unknown_param.insert(THROUGH.to_owned(), through.min(1.0).to_string());
         material.unknown_param.remove("Tf");
+    }
+    if version < (4, 0) && !material.unknown_param.contains_key(THROUGH) {
+        material.optical_density = Some(1.5);
     }
     if let Some(map) = material.shininess_texture.take() {
         material.unknown_param.insert("map_Pr".to_owned(), map);
@@ -73,15 +89,15 @@ mod tests {
     fn restated(text: &str) -> (bool, tobj::Material) {
         let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).unwrap();
         let mut material = materials.into_iter().next().unwrap();
-        (restate(&mut material, smoothest(text).unwrap()), material)
+        (restate(&mut material, version(text).unwrap()), material)
     }
 
     #[test]
     fn only_blender_is_taken_for_blender() {
-        assert_eq!(smoothest("# Blender 3.6.0 MTL File: 'a.blend'\nnewmtl a"), Some(1000.0));
-        assert_eq!(smoothest("# Blender MTL File: 'None'\n# Material Count: 1"), Some(900.0));
+        assert_eq!(version("# Blender 3.6.0 MTL File: 'a.blend'\nnewmtl a"), Some((3, 6)));
+        assert_eq!(version("# Blender MTL File: 'None'\n# Material Count: 1"), Some((0, 0)));
         for text in ["", "newmtl a", "# Exported for Blender", "# 3ds Max\n# Blender 3.6.0"] {
-            assert_eq!(smoothest(text), None, "{text}");
+            assert_eq!(version(text), None, "{text}");
         }
     }
 
@@ -105,10 +121,23 @@ mod tests {
     }
 
     #[test]
+    fn a_map_says_roughness_alone_and_nothing_is_below_zero() {
+        let head = "# Blender 4.2.0 MTL File: 'None'\nnewmtl a\nNs 250\nKd 1 1 1\nNi 1.2\n";
+        let (_, material) = restated(&format!("{head}Ks -20 -20 -20\nmap_Ns rough.png"));
+        assert_eq!(material.unknown_param["map_Pr"], "rough.png");
+        assert!(!material.unknown_param.contains_key("Pr") && material.shininess_texture.is_none());
+        assert_eq!(material.unknown_param[GLOSS], "0");
+        assert_eq!(material.optical_density, Some(1.2));
+    }
+
+    #[test]
     fn mirrors_made_by_hand_and_coloured_gloss_stay() {
         let head = "# Blender MTL File: 'None'\nnewmtl a\nNs 225\nKa 1 1 1\n";
         for rest in [
             "Ni 1.45\nKd 0 0 0\nKs 1 1 1\nillum 3",
+            "Ni 1.5\nKd 0.1 0.1 0.1\nKs 0.9 0.9 0.9\nd 1\nillum 5",
+            "Ni 1.5\nKd 0.1 0.1 0.1\nKs 0.5 0.5 0.5\nd 1\nillum 7",
+            "Ni 1.5\nKd 0.1 0.1 0.1\nKs 0.5 0.5 0.5\nillum 9",
             "Ni 1.45\nKd 0.5 0.5 0.5\nKs 1 0.9 0.8\nillum 2",
             // As 2.78 writes its materials.
             "Ni 1\nKd 0.64 0.64 0.64\nKs 0.5 0.5 0.5\nillum 2",

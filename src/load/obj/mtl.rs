@@ -100,10 +100,10 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
     let tidied = tidy(library, &text, sink);
     match tobj::load_mtl_buf(&mut tidied.as_bytes()) {
         Ok((mut materials, _)) => {
-            let smoothest = blender::smoothest(&text);
-            let count =
-                |most| materials.iter_mut().filter_map(|m| blender::restate(m, most).then_some(())).count();
-            if smoothest.map_or(0, count) > 0 {
+            let restated = |version| {
+                materials.iter_mut().filter_map(|m| blender::restate(m, version).then_some(())).count()
+            };
+            if blender::version(&text).map_or(0, restated) > 0 {
                 let what =
                     "written by Blender: Ns says roughness, Ks the strength of gloss, illum 3 and 6 metal";
                 sink.decide(library, what);

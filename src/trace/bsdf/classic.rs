@@ -78,6 +78,10 @@ impl Classic {
             1 => {
                 let (_, exponent) = self.phong?;
                 let h = around(self.normal, spherical(u.x.powf(1.0 / (exponent + 1.0)), u.y));
+                // Seen from behind it would be the other half of a pair that nobody counts.
+                if self.wo.dot(h) <= 0.0 {
+                    return None;
+                }
                 Proposal::reflected(reflect(self.wo, h))
             }
             2 => {

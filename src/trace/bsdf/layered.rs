@@ -236,7 +236,10 @@ impl Layered {
             && local.z > 0.0
         {
             let below_coat = self.coat.map_or(1.0, |coat| coat.rest_toward(wi));
-            sum.diffuse += sheen.evaluate(self.wo, local) * below_coat;
+            // Light samples are taken above the horizon of the wide lobes.
+            if cos > 0.0 {
+                sum.diffuse += sheen.evaluate(self.wo, local) * below_coat;
+            }
             sum.pdf += sheen::pdf(local) * shares[4];
         }
         if let Some(coat) = &self.coat

@@ -111,7 +111,11 @@ impl Editor {
 pub fn edit_scene(world: &mut World) {
     let input = world.resource::<Input>();
     let presses: Vec<_> = input.taps.iter().filter(|press| press.tap.edits()).copied().collect();
-    let values = input.edits.clone();
+    let mut values = input.edits.clone();
+    if presses.iter().any(|press| press.tap == Tap::Undo) {
+        // They are of a card whose thing may be gone.
+        values.clear();
+    }
     if presses.is_empty() && values.is_empty() {
         return;
     }

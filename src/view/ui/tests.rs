@@ -117,6 +117,7 @@ fn the_same_twice_is_the_same_to_the_bit() {
     let open = |ui: &mut Ui| ui.help.turn();
     assert_eq!(drawn(size, 1.0, open, 50), drawn(size, 1.0, open, 50));
 }
+
 #[test]
 fn a_click_into_the_picture_takes_the_keyboard_from_the_card() {
     let mut status = status();
