@@ -4,7 +4,6 @@ use crate::headless;
 #[cfg(feature = "view")]
 use crate::{exit, signal::set_threads};
 use penumbra::cli::WindowArgs;
-use penumbra::view::keymap::Keymap;
 #[cfg(feature = "view")]
 use penumbra::{app::FrameBudget, open::open, render::open_reference, shown::Shown, trace::RenderSettings};
 
@@ -29,7 +28,9 @@ pub fn run(args: &WindowArgs) -> u8 {
     let (keys, notice) = match penumbra::view::keys_file::read(args.keys.as_deref()) {
         Ok(keys) => (keys, String::new()),
         // Whoever named no file may not see what is printed.
-        Err(error) if args.keys.is_none() => (Keymap::default(), format!("the usual keys: {error}")),
+        Err(error) if args.keys.is_none() => {
+            (penumbra::view::keymap::Keymap::default(), format!("the usual keys: {error}"))
+        }
         Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
     };
     if !notice.is_empty() {
