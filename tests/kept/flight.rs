@@ -127,8 +127,9 @@ pub fn fly(
     }
 }
 
-/// What is flown through, with how much of the error of a whole new picture of one sample may be left at equal samples: 0.88,
-/// 0.82, 0.55 and 0.59 were measured. (Neighbours share paths: a new picture of `path` is not much worse than old samples.)
+/// What is flown through, with how much of the error of a whole new picture of one sample may be left at equal samples: 0.91,
+/// 0.85, 0.55 and 0.72 were measured. (Neighbours share paths: a new picture of `path` is not much worse than old samples. Since the
+/// kitchen has the materials that Blender meant, a new picture of it has 0.7 of the error that it had, with old samples as much as before.)
 pub fn flights() -> Vec<(String, Integrator, f64)> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
     let kitchen = shared.join("obj/kitchen/kitchen.obj");
@@ -138,7 +139,7 @@ pub fn flights() -> Vec<(String, Integrator, f64)> {
         ("gallery".into(), Integrator::Direct, 0.7),
     ];
     if kitchen.is_file() {
-        flights.push((kitchen.display().to_string(), Integrator::Direct, 0.7));
+        flights.push((kitchen.display().to_string(), Integrator::Direct, 0.8));
     } else {
         println!("SKIPPED the kitchen: the shared scenes are not here");
     }
