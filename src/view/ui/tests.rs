@@ -4,17 +4,19 @@ use super::super::status::tests::status;
 use super::*;
 use std::sync::Arc;
 
+/// What there is to show, with nothing open.
+fn content<'a>(
+    status: Option<&'a Status>,
+    notice: &'a str,
+    keys: &'a Keymap,
+    letters: &'a Letters,
+) -> Content<'a> {
+    Content { status, measured: Measured::default(), loading: None, notice, compared: None, keys, letters }
+}
+
 fn drawn(size: UVec2, display: f64, change: impl FnOnce(&mut Ui), background: u8) -> Vec<u8> {
     let (status, keys, letters) = (status(), Keymap::default(), Letters::default());
-    let content = Content {
-        status: Some(&status),
-        measured: Measured::default(),
-        loading: None,
-        notice: "saved cornell_1.png",
-        compared: None,
-        keys: &keys,
-        letters: &letters,
-    };
+    let content = content(Some(&status), "saved cornell_1.png", &keys, &letters);
     let mut ui = Ui::default();
     change(&mut ui);
     let mut rgba = vec![background; size.element_product() as usize * 4];
@@ -52,15 +54,7 @@ fn everything_goes_into_a_window_of_any_size_on_any_display() {
 #[test]
 fn every_page_of_the_help_is_inside_the_window() {
     let (keys, letters) = (Keymap::default(), Letters::default());
-    let content = Content {
-        status: None,
-        measured: Measured::default(),
-        loading: None,
-        notice: "",
-        compared: None,
-        keys: &keys,
-        letters: &letters,
-    };
+    let content = content(None, "", &keys, &letters);
     for (width, height, most) in
         [(1920, 1080, 1), (960, 540, 2), (640, 400, 4), (320, 240, 12), (200, 600, 12)]
     {
@@ -88,15 +82,8 @@ fn every_page_of_the_help_is_inside_the_window() {
 #[test]
 fn nothing_is_drawn_if_nothing_is_wanted() {
     let (keys, letters) = (Keymap::default(), Letters::default());
-    let content = Content {
-        status: Some(&status()),
-        measured: Measured::default(),
-        loading: None,
-        notice: "",
-        compared: None,
-        keys: &keys,
-        letters: &letters,
-    };
+    let now = status();
+    let content = content(Some(&now), "", &keys, &letters);
     let mut ui = Ui { level: Level::None, ..Ui::default() };
     assert!(ui.is_bare(&content));
     let mut rgba = vec![77; 100 * 100 * 4];
@@ -132,15 +119,7 @@ fn a_click_into_the_picture_takes_the_keyboard_from_the_card() {
     let edited = EditStatus { rows: (0..3).map(row).collect(), ..EditStatus::default() };
     status.edit = Some(Arc::new(edited));
     let (keys, letters) = (Keymap::default(), Letters::default());
-    let content = Content {
-        status: Some(&status),
-        measured: Measured::default(),
-        loading: None,
-        notice: "",
-        compared: None,
-        keys: &keys,
-        letters: &letters,
-    };
+    let content = content(Some(&status), "", &keys, &letters);
     let size = UVec2::new(640, 400);
     let mut ui = Ui::default();
     let mut frame = |ui: &mut Ui| ui.draw(&mut vec![0; 640 * 400 * 4], size, 1.0, &content);
