@@ -30,6 +30,43 @@ fn a_ray_does_not_depend_on_how_far_away_its_neighbours_start() {
     }
 }
 
+/// Long thin triangles in parts are in many leaves, which then share one list of triangles.
+#[test]
+fn every_kernel_finds_needles_whose_leaves_share_them() {
+    let mut rng = Rng(11);
+    let needle = |_| {
+        let (p, along) = (rng.vec() * 10.0, rng.vec() * 8.0);
+        [p, p + along, p + along + rng.vec() * 0.05]
+    };
+    let triangles: Vec<[Vec3; 3]> = (0..3000).map(needle).collect();
+    let blas = Blas::build(&triangles);
+    assert!(blas.hierarchy().prims.len() > 2 * triangles.len(), "not in parts");
+    assert_eq!(check(&blas, &triangles), Ok(()));
+    // Half of the rays start side by side, so that packets are made of them.
+    let scale = 20.0;
+    let rays: Vec<Ray> = (0..4000)
+        .map(|i| {
+            let ray = aimed_ray(&mut rng, &triangles, scale, Vec3::ZERO);
+            let eye = Vec3::new(0.0, 0.0, -30.0);
+            let target = Vec3::new((i % 64) as f32 * 0.1 - 3.0, (i / 64) as f32 * 0.1 - 3.0, 0.0);
+            if i % 128 < 64 { ray } else { Ray::new(eye, target - eye) }
+        })
+        .collect();
+    let expected: Vec<_> =
+        rays.par_iter().map(|ray| brute_force_in(&blas.bounds(), &triangles, ray)).collect();
+    let hits = expected.iter().flatten().count();
+    assert!((1500..3900).contains(&hits), "{hits} hits");
+    for isa in Isa::available() {
+        let name = format!("needles, {}", isa.name());
+        assert_eq!(ask(&name, &blas.clone().with_isa(isa), &rays), expected, "{name}");
+    }
+    assert!(blas.is_over(&triangles), "what it was built from");
+    let mut moved = triangles.clone();
+    moved[2999][2].x = moved[2999][2].x.next_up();
+    assert!(!blas.is_over(&moved), "one corner is elsewhere");
+    assert!(blas.refit(&triangles).is_none(), "parts have no place to move to");
+}
+
 /// 10⁶ rays to a mesh of 3732 triangles, half of them aimed at corners and edges: every kernel finds the same as
 /// trying all, bit for bit, in packets; one ray of 16 alone too. There is one builder and one width of nodes.
 ///

@@ -27,8 +27,7 @@ impl Blas {
     /// With more than [`MOST_TRIANGLES`](super::MOST_TRIANGLES).
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
-        let (wide, rows) = build_triangles(triangles);
-        let leaves = Leaves::new(&wide, rows);
+        let (wide, leaves) = build_triangles(triangles);
         Self { wide, leaves, isa: Isa::detect(), built_cost: None }
     }
 
@@ -54,7 +53,7 @@ impl Blas {
                     *there = true;
                 }
             }
-            self.leaves.same(first, count, triangles)
+            self.leaves.same((first, count), triangles)
         }) && triangles.iter().zip(there).all(|(corners, there)| there || !has_surface(corners))
     }
 

@@ -4,9 +4,9 @@ use super::found::Found;
 use super::packet::Packet;
 use super::probe::AXES;
 use super::rows::{GROUP, PACKET, each, lowest};
-use super::simd::{Lanes, Mask, Simd, three};
+use super::simd::{Lanes, Mask, Octet, Simd, three};
 use super::triangle::{Edges, Shear, TriangleHit, within};
-use super::wide::{MAX_LEAF, WideBvh};
+use super::wide::MAX_LEAF;
 use super::{Hit, Probe};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,23 +16,41 @@ use std::sync::Arc;
 /// For a leaf of n triangles nine rows of n floats, without gaps: all first corners' x, their y, their z,
 /// then those of the second and the third corners. So a leaf is as compact as its triangles, and a
 /// vector over them is a load from anywhere.
+///
+/// Where most triangles are in several leaves all share one list of them, in which a leaf's are looked up.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Leaves {
+    /// A row after the other, or a triangle after the other.
     rows: Vec<f32>,
-    /// [`WideBvh::prims`].
+    /// [`WideBvh::prims`](super::WideBvh::prims).
     ids: Arc<[u32]>,
+    shared: bool,
+}
+
+/// Floats of a triangle.
+const FLOATS: usize = 9;
+
+/// Whether leaves with so many entries in all share one list of the triangles.
+fn is_shared(triangles: usize, entries: usize) -> bool {
+    2 * entries > 3 * triangles
+}
+
+/// Bytes of leaves that have so many entries in all.
+pub(super) fn bytes(triangles: usize, entries: usize) -> usize {
+    let copies = if is_shared(triangles, entries) { triangles } else { entries };
+    copies * FLOATS * size_of::<f32>() + entries * size_of::<u32>()
 }
 
 /// The rows of all `leaves`, given by first entry and number of entries, whose triangles are `ids`. Each list
 /// is about all entries from the end of the last one on.
-pub(super) fn rows(leaves: Vec<Vec<[u32; 2]>>, ids: &[u32], triangles: &[[Vec3; 3]]) -> Vec<f32> {
+fn rows(leaves: Vec<Vec<[u32; 2]>>, ids: &[u32], triangles: &[[Vec3; 3]]) -> Vec<f32> {
     // A leaf's last vector may reach beyond its own rows. Zeroed memory comes when it is touched.
-    let mut rows = vec![0.0; ids.len() * 9 + MAX_LEAF];
+    let mut rows = vec![0.0; ids.len() * FLOATS + MAX_LEAF];
     let (mut rest, mut start) = (&mut *rows, 0);
     let mut places = Vec::with_capacity(leaves.len());
     for list in leaves {
         let entries = list.iter().map(|[_, count]| *count as usize).sum::<usize>();
-        let (own, others) = rest.split_at_mut(entries * 9);
+        let (own, others) = rest.split_at_mut(entries * FLOATS);
         places.push((list, start, own));
         start += entries;
         rest = others;
@@ -40,7 +58,7 @@ pub(super) fn rows(leaves: Vec<Vec<[u32; 2]>>, ids: &[u32], triangles: &[[Vec3; 
     places.into_par_iter().for_each(|(list, start, rows)| {
         for [first, count] in list {
             let (first, count) = (first as usize, count as usize);
-            let own = &mut rows[(first - start) * 9..][..count * 9];
+            let own = &mut rows[(first - start) * FLOATS..][..count * FLOATS];
             fill_leaf(&ids[first..first + count], own, triangles);
         }
     });
@@ -60,35 +78,32 @@ pub(super) fn fill_leaf(ids: &[u32], rows: &mut [f32], triangles: &[[Vec3; 3]]) 
 }
 
 impl Leaves {
-    /// With rows that [`rows`] has made.
-    pub fn new(wide: &WideBvh, rows: Vec<f32>) -> Self {
-        Self { rows, ids: Arc::clone(&wide.prims) }
+    /// `leaves` as [`rows`] takes them, whose triangles are `ids`.
+    pub fn new(leaves: Vec<Vec<[u32; 2]>>, ids: &Arc<[u32]>, triangles: &[[Vec3; 3]]) -> Self {
+        let shared = is_shared(triangles.len(), ids.len());
+        let rows = if shared {
+            triangles.iter().flatten().flat_map(Vec3::to_array).collect()
+        } else {
+            rows(leaves, ids, triangles)
+        };
+        Self { rows, ids: Arc::clone(ids), shared }
     }
 
-    /// Those of one leaf.
+    /// Those of one leaf, if it has its own.
     pub fn rows_of(&mut self, first: usize, count: usize) -> &mut [f32] {
-        &mut self.rows[first * 9..(first + count) * 9]
+        &mut self.rows[first * FLOATS..(first + count) * FLOATS]
     }
 
     /// Whether the triangles of a leaf are what `triangles` has in their places, to the bit.
-    pub fn same(&self, first: usize, count: usize, triangles: &[[Vec3; 3]]) -> bool {
-        let rows = &self.rows[first * 9..(first + count) * 9];
+    pub fn same(&self, leaf: (usize, usize), triangles: &[[Vec3; 3]]) -> bool {
         let bits = |corners: &[Vec3; 3]| corners.map(|p| p.to_array().map(f32::to_bits));
-        (0..count).all(|i| {
-            let here = Self::corners(rows, count, i);
-            triangles.get(self.ids[first + i] as usize).is_some_and(|there| bits(there) == bits(&here))
-        })
-    }
-
-    /// The triangles of a leaf.
-    pub fn triangles(&self, first: usize, count: usize) -> impl Iterator<Item = [Vec3; 3]> {
-        let rows = &self.rows[first * 9..(first + count) * 9];
-        (0..count).map(move |i| Self::corners(rows, count, i))
+        self.numbered(leaf)
+            .all(|(id, here)| triangles.get(id as usize).is_some_and(|there| bits(there) == bits(&here)))
     }
 
     /// The triangles of a leaf, with their numbers.
-    pub fn numbered(&self, (first, count): (usize, usize)) -> impl Iterator<Item = (u32, [Vec3; 3])> {
-        self.ids[first..first + count].iter().copied().zip(self.triangles(first, count))
+    pub fn numbered(&self, leaf: (usize, usize)) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        (0..leaf.1).map(move |i| (self.ids[leaf.0 + i], self.corners(leaf, i)))
     }
 
     pub fn bytes(&self) -> usize {
@@ -97,8 +112,13 @@ impl Leaves {
 
     /// A triangle of a leaf.
     #[inline(always)]
-    fn corners(rows: &[f32], count: usize, i: usize) -> [Vec3; 3] {
-        three!(|c| Vec3::from_array(three!(|axis| rows[(3 * c + axis) * count + i])))
+    fn corners(&self, (first, count): (usize, usize), i: usize) -> [Vec3; 3] {
+        let (rows, step) = if self.shared {
+            (&self.rows[self.ids[first + i] as usize * FLOATS..][..FLOATS], 1)
+        } else {
+            (&self.rows[first * FLOATS + i..], count)
+        };
+        three!(|c| Vec3::from_array(three!(|axis| rows[(3 * c + axis) * step])))
     }
 
     /// One ray, up to eight triangles. `offer` is told of each hit at or before `t_max`, and whether it takes
@@ -114,7 +134,13 @@ impl Leaves {
         mut offer: impl FnMut(Hit) -> bool,
     ) -> ControlFlow<(), f32> {
         let (first, count) = leaf;
-        let rows = &self.rows[first * 9..first * 9 + count * 9 + MAX_LEAF];
+        let gathered;
+        let (rows, step) = if self.shared {
+            gathered = S::F8::gather(simd, &self.rows, &self.ids[first..][..count]);
+            (gathered.as_flattened(), MAX_LEAF)
+        } else {
+            (&self.rows[first * FLOATS..][..count * FLOATS + MAX_LEAF], count)
+        };
         let mut candidates = lowest(count) as u32;
         let (mut certain, mut doubtful, mut close) = (0, 0, 0);
         let (mut ts, mut us, mut vs) = ([0.0; MAX_LEAF], [0.0; MAX_LEAF], [0.0; MAX_LEAF]);
@@ -123,7 +149,7 @@ impl Leaves {
                 origin: three!(|i| S::F8::splat(simd, probe.sheared_origin[i])),
                 shear: three!(|i| S::F8::splat(simd, probe.shear[i])),
             };
-            let edges = shear.edges(S::F8::load_corners(simd, rows, count, &AXES[probe.axis]));
+            let edges = shear.edges(S::F8::load_corners(simd, rows, step, &AXES[probe.axis]));
             candidates &= edges.inside(simd).bits();
             if candidates == 0 {
                 return ControlFlow::Continue(t_max);
@@ -142,7 +168,7 @@ impl Leaves {
         }
         for i in each(u64::from(candidates)) {
             let i = i % MAX_LEAF;
-            let corners = || Self::corners(rows, count, i);
+            let corners = || self.corners(leaf, i);
             let rough = TriangleHit { t: ts[i], u: us[i], v: vs[i] };
             let found = if certain >> i & 1 != 0 {
                 within(rough, t_max)
@@ -179,11 +205,10 @@ impl Leaves {
         takes: Option<impl Fn(usize, &Hit) -> bool>,
     ) -> u64 {
         let (first, count) = leaf;
-        let rows = &self.rows[first * 9..first * 9 + count * 9];
         let axes = AXES[packet.axis];
         let mut done = 0;
         for i in 0..count {
-            let corners = Self::corners(rows, count, i);
+            let corners = self.corners(leaf, i);
             let permuted = three!(|c| three!(|i| S::F16::splat(simd, corners[c][axes[i]])));
             let triangle = self.ids[first + i];
             let mut rest = rays & !done;

@@ -164,10 +164,10 @@ impl Blas {
         mut report: impl FnMut([Vec3; 3]) -> bool,
     ) -> bool {
         shaft.misses_box(&self.bounds())
-            || search(&self.wide, shaft, patience, |(first, count), _| {
+            || search(&self.wide, shaft, patience, |leaf, _| {
                 self.leaves
-                    .triangles(first, count)
-                    .all(|triangle| shaft.misses_triangle(&triangle) || report(triangle))
+                    .numbered(leaf)
+                    .all(|(_, triangle)| shaft.misses_triangle(&triangle) || report(triangle))
             })
     }
 }

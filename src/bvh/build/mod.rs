@@ -9,7 +9,8 @@ mod split;
 pub(super) use binned::Subtree;
 pub use check::Defect;
 
-use super::{Aabb, WideBvh, leaves, merge, wide};
+use super::leaves::{self, Leaves};
+use super::{Aabb, WideBvh, merge, wide};
 use glam::{DVec3, Vec3};
 use merge::Part;
 use prim::Prim;
@@ -51,12 +52,8 @@ pub const MAX_DEPTH: usize = SAH_LEVELS + 32;
 const MAX_LEAF: usize = 4;
 /// Long lists are worked at in pieces of this length, by all threads.
 const PIECE: usize = 1 << 14;
-/// Nodes and corners take no more for each triangle of a mesh of thousands ...
+/// Nodes and triangles take no more for each triangle of a mesh of thousands.
 const BYTES: f32 = 72.0;
-/// ... of which each entry of a leaf takes this, three corners and a number ...
-const BYTES_OF_ENTRY: f32 = 40.0;
-/// ... but where a small scene's slivers are split nodes have this for each entry in any case.
-const LEAST_ROOM: f32 = 10.0;
 
 impl Bvh {
     /// Builds over `boxes`, all finite and not empty, each in a leaf of its own. There may be none, or many
@@ -101,13 +98,13 @@ fn prims_of(triangles: &[[Vec3; 3]]) -> (Vec<Prim>, Waste) {
     (prims, wastes.into_iter().fold(Waste::default(), Waste::union))
 }
 
-/// Wide hierarchy and rows of corners over `triangles`.
-pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
+/// Wide hierarchy over `triangles`, and these in the order of its leaves.
+pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Leaves) {
     assert!(triangles.len() <= MOST_TRIANGLES, "{} triangles in one mesh", triangles.len());
     let (prims, waste) = prims_of(triangles);
     let prims = split::split(prims, &waste, triangles);
     if prims.is_empty() {
-        return (WideBvh::default(), Vec::new());
+        return (WideBvh::default(), Leaves::default());
     }
     // The boxes are gone, and nodes only once there, before there are corners: so the most memory that is ever
     // needed is that of the boxes.
@@ -115,13 +112,13 @@ pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Vec<f32>) {
     let (tree, order) = binned::build(prims, MAX_LEAF, &|nodes| Part::new(&nodes, wide::MAX_LEAF, room));
     let leaves = tree.parts().into_par_iter().map(Part::leaf_list).collect();
     let wide = merge::join(tree, order);
-    let rows = leaves::rows(leaves, &wide.prims, triangles);
-    (wide, rows)
+    let leaves = Leaves::new(leaves, &wide.prims, triangles);
+    (wide, leaves)
 }
 
 /// Bytes of nodes for each entry of a leaf.
 fn room(triangles: usize, entries: usize) -> f32 {
-    (BYTES * triangles as f32 / entries as f32 - BYTES_OF_ENTRY).max(LEAST_ROOM)
+    (BYTES * triangles as f32 - leaves::bytes(triangles, entries) as f32) / entries as f32
 }
 
 /// Judged in double precision, where differences and products of f32 are exact or nearly so.

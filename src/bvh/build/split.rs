@@ -15,22 +15,23 @@ use rayon::prelude::*;
 const SLIVER: f32 = 8.0;
 /// ... are split if they have this part of the area of all boxes.
 const WORTH_SPLITTING: f64 = 0.1;
+/// A mesh is mostly slivers if they have this part of the sizes (roots of areas) of all boxes.
+const MOSTLY_SLIVERS: f64 = 0.5;
 /// No triangle has more parts.
 const MAX_PARTS: f64 = 4096.0;
+/// Never too many.
+const FEW_PARTS: usize = 1000;
 
-/// More references than triangles: a quarter, but small scenes may have this many in any case.
-fn budget(triangles: usize) -> usize {
-    (triangles / 4).max((64 * triangles).min(40_000))
-}
-
-/// How much of the boxes of triangles is empty: sums of half areas.
+/// How much of the boxes of triangles is empty.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Waste {
-    /// Of all boxes.
+    /// Half areas of all boxes.
     all: f64,
     /// Of those that are much larger than their triangle needs.
     slivers: f64,
-    /// Square roots of what could be saved at most.
+    /// Square roots of the half areas of all boxes.
+    sizes: f64,
+    /// Square roots of what could be saved at most of slivers.
     roots: f64,
 }
 
@@ -39,27 +40,42 @@ impl Waste {
     pub fn add(&mut self, prim: &Prim, corners: &[Vec3; 3]) {
         let (area, least) = (prim.half_area(), least_half_area(corners));
         self.all += f64::from(area);
+        self.sizes += f64::from(area).sqrt();
+        self.roots += root(area, least);
         if area > SLIVER * least {
             self.slivers += f64::from(area);
         }
-        self.roots += root(area, least);
     }
 
     pub fn union(self, other: Self) -> Self {
-        let Self { all, slivers, roots } = other;
-        Self { all: self.all + all, slivers: self.slivers + slivers, roots: self.roots + roots }
+        let Self { all, slivers, sizes, roots } = other;
+        Self {
+            all: self.all + all,
+            slivers: self.slivers + slivers,
+            sizes: self.sizes + sizes,
+            roots: self.roots + roots,
+        }
     }
 
     /// Whether splitting is worth it.
     fn is_much(&self) -> bool {
         self.slivers > WORTH_SPLITTING * self.all && self.roots > 0.0 && self.roots.is_finite()
     }
+
+    /// How many more references than triangles there may be.
+    fn budget(&self, triangles: usize) -> usize {
+        if self.roots > MOSTLY_SLIVERS * self.sizes {
+            (triangles * 17 / 10).max((16 * triangles).min(FEW_PARTS))
+        } else {
+            triangles / 4
+        }
+    }
 }
 
-/// Of what could be saved of a box.
+/// Of what could be saved of a sliver's box; nothing of others.
 #[inline]
 fn root(area: f32, least: f32) -> f64 {
-    f64::from((area - least).max(0.0)).sqrt()
+    if area > SLIVER * least { f64::from(area - least).sqrt() } else { 0.0 }
 }
 
 /// Replaces references to whole triangles by several to parts, where that pays.
@@ -69,7 +85,7 @@ pub(super) fn split(prims: Vec<Prim>, waste: &Waste, triangles: &[[Vec3; 3]]) ->
     }
     let bounds = prims.iter().fold(Aabb::EMPTY, |bounds, prim| bounds.union(prim.aabb()));
     let grid = Grid::new(&bounds);
-    let share = budget(prims.len()) as f64 / waste.roots;
+    let share = waste.budget(prims.len()) as f64 / waste.roots;
     let parts: Vec<Vec<Prim>> = prims
         .par_chunks(1 << 12)
         .map(|piece| {

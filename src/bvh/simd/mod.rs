@@ -11,6 +11,8 @@
 mod isa;
 mod portable;
 #[cfg(target_arch = "x86_64")]
+mod transpose;
+#[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub use isa::{Isa, Job};
@@ -125,8 +127,25 @@ pub trait Mask: Copy {
     fn bits(self) -> u32;
 }
 
-/// What only vectors of eight are asked for: the children of a node.
+/// What only vectors of eight are asked for: the children of a node, the triangles of a leaf.
 pub trait Octet: Lanes {
+    /// For each of nine coordinates a row of those of the `triangles`, nine floats each, that `ids` name, one to
+    /// eight. What follows them in the rows is finite if they are.
+    ///
+    /// # Panics
+    /// Without ids, or where there is no such triangle.
+    #[inline(always)]
+    fn gather(_: Self::Proof, triangles: &[f32], ids: &[u32]) -> [[f32; 8]; 9] {
+        let mut rows = [[0.0; 8]; 9];
+        for (lane, &id) in ids.iter().take(8).enumerate() {
+            let triangle = &triangles[id as usize * 9..][..9];
+            for (row, x) in rows.iter_mut().zip(triangle) {
+                row[lane] = *x;
+            }
+        }
+        rows
+    }
+
     /// Puts the lanes of `near` for which `near` ≤ `far`, and their `children`, at the front of the
     /// stacks, in the order that the eight triples of bits of `order` name; returns how many. The
     /// stacks have room for eight, and may be left with anything beyond the ones counted.

@@ -1,6 +1,7 @@
 //! AVX2 and AVX-512.
 
 use super::portable::{Pair, pair_lanes};
+use super::transpose::{gather, of_four};
 use super::{Lanes, Mask, Octet, Part, Simd, portable::PairMask};
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
@@ -307,6 +308,8 @@ macro_rules! order_lanes {
 }
 
 impl Octet for Eight {
+    gather!();
+
     #[inline(always)]
     fn push_entered(
         near: Self,
@@ -334,6 +337,8 @@ impl Octet for Eight {
 }
 
 impl Octet for EightVl {
+    gather!();
+
     #[inline(always)]
     fn push_entered(
         near: Self,
