@@ -14,7 +14,10 @@ pub const EVEN: u32 = 3;
 /// first have missed, a thin post perhaps, is seen by then. As measured, with both numbers.
 pub const AGAIN: u32 = 8;
 /// See [`AGAIN`]. Most pixels have as many by then; the others get them first.
-pub const RIPE: u32 = 10;
+pub const RIPE: u32 = 16;
+/// What the first shares still count then. Along an edge eight samples are so well spread that both halves often agree; not so
+/// three.
+const OLD: f32 = 0.5;
 /// Nobody gets less than this share for good, or ever more than that many: what the first samples have missed must have its
 /// chance.
 const LEAST: f32 = 0.05;
@@ -44,6 +47,8 @@ const FAR_NOISE: f32 = 0.1;
 /// What a step between two near ones counts beside noise, squared: an edge goes through the pixel, perhaps just so that both
 /// halves agree. As measured, like the others.
 const EDGE: f32 = 0.06;
+/// A step is what goes beyond this part of the brightest one's square: shades that change slowly cost few samples.
+const SLOPE: f32 = 0.1;
 /// What a step between far ones counts beside one between near ones, squared.
 const FAR_EDGE: f32 = 0.05;
 /// Of the squared error: where n samples leave an error of σ/n^a, with a = 0.75 for scrambled nets on penumbrae and edges, the
@@ -61,7 +66,8 @@ pub fn first_shares(film: &Film) -> Vec<f32> {
     shared_out(wanted, 0.0).into_iter().map(f32::round).collect()
 }
 
-/// Shares for [`Film::allot`]. Half the difference of the two halves stands for the error.
+/// Shares for [`Film::allot`]. Half the difference of the two halves stands for the error; beyond a part of what is there,
+/// so do steps.
 #[must_use]
 pub fn shares(film: &Film) -> Vec<f32> {
     let seen = Seen::of(film);
@@ -72,9 +78,20 @@ pub fn shares(film: &Film) -> Vec<f32> {
         if count == 0.0 {
             return 1.0;
         }
-        ((near.noise + FAR_NOISE * far.noise) / count + EDGE * near.step).powf(POWER)
+        ((near.noise + FAR_NOISE * far.noise) / count + EDGE * (near.step - SLOPE * near.brightest).max(0.0))
+            .powf(POWER)
     });
     shared_out(wanted, LEAST)
+}
+
+/// Shares for [`Film::allot_again`].
+#[must_use]
+pub fn shares_again(film: &Film) -> Vec<f32> {
+    let mut shares = shares(film);
+    for (share, old) in shares.iter_mut().zip(film.shares()) {
+        *share += OLD * (old - *share);
+    }
+    shares
 }
 
 /// These numbers, so that they are 1 on average, and none of them far off.
@@ -108,6 +125,8 @@ struct Around {
     noise: f32,
     /// The square of how far their means are apart.
     step: f32,
+    /// The square of what is nowhere exceeded.
+    brightest: f32,
 }
 
 impl Seen {
@@ -146,6 +165,6 @@ impl Seen {
             }
         }
         let step = (high - low).max(Vec4::ZERO).truncate().length_squared();
-        Around { count: sum.x, noise: sum.w, step }
+        Around { count: sum.x, noise: sum.w, step, brightest: high.truncate().length_squared() }
     }
 }

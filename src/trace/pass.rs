@@ -96,7 +96,7 @@ fn trace_first_shares(
 /// Gives out shares, if it is time.
 fn share_out(scene: &TraceScene, film: &mut Film) {
     if !film.is_allotted() && film.complete_samples() == allot::EVEN {
-        let shares = shares(scene, film);
+        let shares = evened(scene, film, allot::shares(film));
         film.allot(&shares);
     }
 }
@@ -106,14 +106,14 @@ fn share_out_again(scene: &TraceScene, film: &mut Film, keep_going: impl Fn() ->
     let work = Work::Even { until: film.first_sample().saturating_add(allot::AGAIN) };
     let rays = trace_tiles(scene, film, work, film.complete_samples(), keep_going);
     if film.is_ripe() {
-        let shares = shares(scene, film);
+        let shares = evened(scene, film, allot::shares_again(film));
         film.allot_again(&shares);
     }
     rays
 }
 
-fn shares(scene: &TraceScene, film: &Film) -> Vec<f32> {
-    let mut shares = allot::shares(film);
+/// Those who share paths have as many samples.
+fn evened(scene: &TraceScene, film: &Film, mut shares: Vec<f32>) -> Vec<f32> {
     if scene.settings.shares_paths() {
         reuse::even_out(&mut shares, film.size().x as usize);
     }

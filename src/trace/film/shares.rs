@@ -129,6 +129,16 @@ impl Film {
         self.tiles.iter_mut().zip(complete).for_each(|(tile, complete)| tile.complete = complete);
     }
 
+    /// The share that each pixel has, rows from the top; none unless they have been given out.
+    pub(in crate::trace) fn shares(&self) -> impl Iterator<Item = f32> {
+        let across = self.size.x.div_ceil(TILE);
+        let places = (0..self.size.y).flat_map(|y| (0..self.size.x).map(move |x| (x, y)));
+        places.filter_map(move |(x, y)| {
+            let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
+            tile.shares.get((y % TILE * tile.size.x + x % TILE) as usize).copied()
+        })
+    }
+
     fn give_shares(&mut self, shares: &[f32]) {
         let even = self.even_samples();
         debug_assert!(!self.tiles.iter().any(Tile::is_half), "a half tile has no even number of samples");
