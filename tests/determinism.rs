@@ -8,6 +8,7 @@ use penumbra::app::{FrameBudget, FrameStats};
 use penumbra::bvh::Isa;
 use penumbra::scene::{Alpha, Glass, Glossy, Light, Material};
 use penumbra::sync::Instructions;
+use penumbra::trace::allot::RIPE;
 use penumbra::trace::{Film, Integrator};
 use stage::{Frames as _, Stage, ball, quad, settings};
 use std::sync::atomic::Ordering;
@@ -186,7 +187,8 @@ fn all_instructions_make_the_same_picture() {
             let mut stage = make();
             stage.app.world.insert_resource(Instructions(isa));
             budget(&mut stage, |b| b.adaptive = true);
-            (isa, until_done(&mut stage, 12))
+            // Shares of samples have been found anew.
+            (isa, until_done(&mut stage, RIPE + 4))
         });
         let films: Vec<_> = films.collect();
         for (isa, film) in &films[1..] {

@@ -145,12 +145,19 @@ fn no_triangle_takes_more_than_72_bytes() {
         };
         (0..count).map(needle).collect::<Vec<_>>()
     };
+    // Then entries are about as many as can have corners of their own.
+    let without_surface = |needles: Vec<[Vec3; 3]>| {
+        let points = needles.iter().map(|needle| [needle[0]; 3]).collect::<Vec<_>>();
+        [needles, points].concat()
+    };
     for (name, triangles) in [
         ("dots", soup(50_000, 0.001, 5)),
         ("soup", soup(50_000, 0.05, 6)),
         ("dense", soup(100_000, 0.5, 7)),
         ("needles", needles(200_000)),
         ("few needles", needles(10_000)),
+        ("small soup", soup(20_000, 0.5, 7)),
+        ("half of it nothing", without_surface(needles(5000))),
     ] {
         let bytes = Blas::build(&triangles).bytes() as f64 / triangles.len() as f64;
         assert!(bytes <= 72.0, "{name}: {bytes} bytes a triangle");

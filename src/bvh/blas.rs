@@ -9,7 +9,7 @@ use super::wide::{WideBvh, WideNode};
 use super::{Aabb, Hit, Probe, Ray};
 use glam::Vec3;
 
-/// A hierarchy over triangles, which it keeps in the order of its leaves.
+/// A hierarchy over triangles, of which it keeps copies.
 #[derive(Clone, Debug, Default)]
 pub struct Blas {
     pub(super) wide: WideBvh,

@@ -1,4 +1,4 @@
-//! Triangles in the order of the leaves, laid out for vectors.
+//! The triangles of the leaves, laid out for vectors.
 
 use super::found::Found;
 use super::packet::Packet;
@@ -81,11 +81,8 @@ impl Leaves {
     /// `leaves` as [`rows`] takes them, whose triangles are `ids`.
     pub fn new(leaves: Vec<Vec<[u32; 2]>>, ids: &Arc<[u32]>, triangles: &[[Vec3; 3]]) -> Self {
         let shared = is_shared(triangles.len(), ids.len());
-        let rows = if shared {
-            triangles.iter().flatten().flat_map(Vec3::to_array).collect()
-        } else {
-            rows(leaves, ids, triangles)
-        };
+        let rows =
+            if shared { bytemuck::cast_slice(triangles).to_vec() } else { rows(leaves, ids, triangles) };
         Self { rows, ids: Arc::clone(ids), shared }
     }
 

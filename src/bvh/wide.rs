@@ -61,7 +61,13 @@ impl Child {
     pub(super) fn pack(self) -> u32 {
         match self {
             Self::Node(index) => index as u32,
-            Self::Leaf { first, count } => LEAF | (count as u32 - 1) << FIRST_BITS | first as u32,
+            Self::Leaf { first, count } => {
+                debug_assert!(
+                    first >> FIRST_BITS == 0 && (1..=MAX_LEAF).contains(&count),
+                    "{count} from {first} on"
+                );
+                LEAF | (count as u32 - 1) << FIRST_BITS | first as u32
+            }
         }
     }
 }

@@ -1,18 +1,18 @@
 //! The thread that owns the [`App`] and runs its frames, so that the window never waits for a ray.
 
-use super::controls::{Notice, Notices, Paused};
+use super::controls::Paused;
 use super::debug::CurrentLayer;
-use super::debug::layer::Layer;
+use super::exchange::{Published, Wake, lock, panic_message, say};
 use super::input::{Command, Input};
 use super::instrument::{Instrument, Reference, Seen};
 use super::keymap::Tap;
-use super::plain::Plain;
 use super::playing::Clock;
 use super::prepare::{prepare, status};
 use super::reload::{self, load_again, open_other, set_sky};
 use super::sides::{Compared, Sides};
-use super::status::{Status, counted};
-use super::watch::{PAUSE, SceneWatch};
+use super::status::counted;
+use super::waiting::{Files, counted_until, of_one_frame};
+use super::watch::SceneWatch;
 use crate::app::{App, FrameBudget, FrameStats};
 use crate::image::Picture;
 use crate::image::compare::LinearImage;
@@ -28,7 +28,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Refinement per frame while the view changes: none, the next preview is worth more than some tiles.
@@ -44,56 +44,6 @@ const PRESENTING: Duration = Duration::from_millis(20);
 /// Whether there is something left to do although all samples are there. Set by systems, lowered before each frame.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending(pub bool);
-
-/// What the engine tells the window's thread to look at.
-#[derive(Clone, Debug)]
-pub enum Wake {
-    /// [`Published`] has news.
-    FrameReady,
-    /// The scene could not be opened.
-    OpenFailed(String),
-    /// The engine's thread panicked.
-    Crashed(String),
-    /// The picture of the film alone that this key asked for.
-    Plain(Tap, Picture),
-    /// Something to show to the user.
-    Notice(String),
-    /// Something to be pasted elsewhere, and what to say before it.
-    Copy {
-        /// Nothing, or with its end of a sentence.
-        said: String,
-        /// To be pasted.
-        text: String,
-    },
-    /// Another scene is shown now.
-    Opened {
-        /// Its name.
-        name: String,
-        /// Where its file lies, with a separator at its end; empty if it has none.
-        folder: String,
-    },
-}
-
-/// The latest that the engine made; what the window has not taken is overwritten.
-#[derive(Debug, Default)]
-pub struct Published {
-    /// A picture, if it is newer than the one taken last.
-    pub picture: Option<Picture>,
-    /// A picture that is no longer needed, for its memory.
-    pub spare: Picture,
-    /// What is drawn over the picture.
-    pub layer: Option<Arc<Layer>>,
-    /// What is loading, and how far it is.
-    pub loading: Option<String>,
-    /// What the picture is compared with.
-    pub compared: Compared,
-    /// For the status lines. `None` until the scene is open.
-    pub status: Option<Status>,
-    /// Whether the view is changing, so that pictures are to be shown at once.
-    pub moving: bool,
-    /// When the user asked for what the picture is the first to show.
-    pub asked: Option<Instant>,
-}
 
 /// The engine's ends of what connects it with the window.
 pub struct Engine<W> {
@@ -113,11 +63,6 @@ pub struct Engine<W> {
     pub presented: Option<Receiver<u64>>,
     /// Makes the window look.
     pub wake: W,
-}
-
-/// Locks `mutex`, also after a thread panicked with it: what we share is whole at any time.
-pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
@@ -242,7 +187,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 && !cut_off
                 && (stats.done || app.world.resource::<Paused>().0)
                 && !app.world.resource::<Pending>().0;
-            self.say(app);
+            say(app, &self.wake);
             self.publish(app, version, moving, asked);
             let shown = app.world.resource::<Picture>().version;
             if self.await_presented(shown, moving)
@@ -361,29 +306,6 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         }
         false
     }
-
-    /// Passes the frame's notices on.
-    fn say(&self, app: &mut App) {
-        for (tap, picture) in std::mem::take(&mut app.world.resource_mut::<Plain>().0) {
-            (self.wake)(Wake::Plain(tap, picture));
-        }
-        for notice in std::mem::take(&mut app.world.resource_mut::<Notices>().0) {
-            (self.wake)(match notice {
-                Notice::Text(text) => Wake::Notice(text),
-                Notice::Print(text) => {
-                    use std::io::Write;
-                    // Whoever closed standard output does not want to read it.
-                    let _ = writeln!(std::io::stdout(), "{text}");
-                    Wake::Copy { said: String::new(), text }
-                }
-                Notice::Saved(said, text) => {
-                    use std::io::Write;
-                    let _ = writeln!(std::io::stdout(), "{text}");
-                    Wake::Copy { said, text }
-                }
-            });
-        }
-    }
 }
 
 /// How much of the scene is not as its files say; nothing if all is.
@@ -397,64 +319,10 @@ fn told_wrong(app: &App) -> String {
     }
 }
 
-/// The files of the scene, and when it is to be loaded again for them.
-struct Files {
-    watch: Option<SceneWatch>,
-    due: Option<Instant>,
-}
-
-impl Files {
-    /// Something happened in their folders.
-    fn look(&mut self) {
-        if self.watch.as_mut().is_some_and(SceneWatch::has_changed) {
-            self.due = Some(Instant::now() + PAUSE);
-        }
-    }
-
-    fn is_time(&mut self) -> bool {
-        self.due.take_if(|due| *due <= Instant::now()).is_some()
-    }
-
-    /// The next command, or until it is time.
-    fn wait(&self, commands: &Receiver<Command>) -> Result<Command, RecvTimeoutError> {
-        match self.due {
-            Some(due) => commands.recv_timeout(due.saturating_duration_since(Instant::now())),
-            None => commands.recv().map_err(|_| RecvTimeoutError::Disconnected),
-        }
-    }
-}
-
-/// Takes what the next frame does. Its systems have an order of their own: what a key does shall come after all that
-/// the user did before, so a key waits for a frame of its own, with its repetitions.
-fn of_one_frame(waiting: &mut VecDeque<Command>) -> Vec<Command> {
-    let first = match waiting.front() {
-        Some(Command::Tap { press, .. }) => Some(press.tap),
-        _ => None,
-    };
-    let waits = |command: &Command| matches!(command, Command::Tap { press, .. } if Some(press.tap) != first);
-    let count = waiting.iter().skip(1).position(waits).map_or(waiting.len(), |others| others + 1);
-    waiting.drain(..count).collect()
-}
-
-/// Until when keys that are held count in this frame: what happens from the next key on comes with that one's frame.
-fn counted_until(waiting: &VecDeque<Command>, now: Instant) -> Instant {
-    match waiting.front() {
-        Some(Command::Tap { at, .. }) => now.min(*at),
-        _ => now,
-    }
-}
-
 /// Applies `command`; the first question for another view is remembered in `asked`.
 fn note(app: &mut App, command: &Command, asked: &mut Option<Instant>) {
     let at = app.world.resource_mut::<Input>().apply(command);
     *asked = asked.or(at);
-}
-
-/// The text of a caught panic.
-pub fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("panic without a message").to_owned()
 }
 
 #[cfg(test)]

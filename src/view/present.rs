@@ -2,7 +2,7 @@
 
 use super::ViewError;
 use super::crop;
-use super::engine::{Wake, lock};
+use super::exchange::{Wake, lock};
 use super::input::Command;
 use super::keymap::{Hold, Tap};
 use super::screen::{Presented, Screen};

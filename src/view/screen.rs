@@ -1,6 +1,6 @@
 //! The window and the surface that its pixels are presented on.
 
-use super::engine::{lock, panic_message};
+use super::exchange::{lock, panic_message};
 use super::without_place;
 use glam::UVec2;
 use pixels::wgpu::{DeviceType, PresentMode, SurfaceError, TextureFormat};

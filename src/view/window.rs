@@ -2,7 +2,8 @@
 
 use super::chord::Letters;
 use super::debug::layer::Layer;
-use super::engine::{Engine, Published, Wake};
+use super::engine::Engine;
+use super::exchange::{Published, Wake};
 use super::input::{Command, Drag};
 use super::keymap::Hold;
 use super::keys::Down;

@@ -17,7 +17,7 @@ use penumbra::torture::light::slopes::{Slope, errors, judge_long_run, judge_slop
 use penumbra::torture::light::sums::{Accumulator, a_day, adding, exposed, poison, poisoned_film, scenes};
 use penumbra::torture::oracle::Rng;
 use penumbra::torture::stage::{Stage, reds};
-use penumbra::trace::allot::EVEN;
+use penumbra::trace::allot::{EVEN, RIPE};
 use penumbra::trace::sampler::{Sampler, hash, unit_float};
 use penumbra::trace::{Film, Sampling, TraceScene, trace_pass};
 
@@ -234,12 +234,13 @@ fn stopping_early_is_found() {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let (mut stopping, mut fair) = (Vec::new(), Vec::new());
     for seed in 0..200 {
-        let (all, few) = (film(seed, 16), film(seed, EVEN));
+        // Beyond the samples by which shares are found anew.
+        let (all, few) = (film(seed, RIPE + 4), film(seed, EVEN));
         // Dark by chance is dark for ever.
         let pairs = reds(&all).into_iter().zip(reds(&few));
         let stopped = pairs.map(|(all, few)| if few == 0.0 { 0.0 } else { all });
         stopping.push(mean(&stopped.collect::<Vec<f64>>()));
-        fair.push(mean(&reds(&adaptively(&stage, seed, 16, false))));
+        fair.push(mean(&reds(&adaptively(&stage, seed, RIPE + 4, false))));
     }
     finds("standard errors off", &bias("stopping", 1, &stopping, exact));
     let fair = bias("fair", 1, &fair, exact);

@@ -40,10 +40,11 @@ pub struct Bvh {
     pub prims: Vec<u32>,
 }
 
-/// Triangles that fit into one mesh: leaves tell their first entry by so many bits, and there may be a quarter more
-/// entries than triangles.
+/// Triangles that fit into one mesh: fewer than entries.
 pub const MOST_TRIANGLES: usize = 200_000_000;
-const _: () = assert!(MOST_TRIANGLES / 4 * 5 < 1 << wide::FIRST_BITS);
+/// Entries of leaves, triangles and parts: leaves tell the first by so many bits.
+const MOST_ENTRIES: usize = 1 << wide::FIRST_BITS;
+const _: () = assert!(MOST_TRIANGLES < MOST_ENTRIES);
 /// Levels split by the heuristic; below them the list is halved, which ends after 32 levels more.
 const SAH_LEVELS: usize = 32;
 /// No path from the root has more inner nodes: the bound of every traversal stack.
@@ -98,7 +99,7 @@ fn prims_of(triangles: &[[Vec3; 3]]) -> (Vec<Prim>, Waste) {
     (prims, wastes.into_iter().fold(Waste::default(), Waste::union))
 }
 
-/// Wide hierarchy over `triangles`, and these in the order of its leaves.
+/// Wide hierarchy over `triangles`, and these as its leaves have them.
 pub(super) fn build_triangles(triangles: &[[Vec3; 3]]) -> (WideBvh, Leaves) {
     assert!(triangles.len() <= MOST_TRIANGLES, "{} triangles in one mesh", triangles.len());
     let (prims, waste) = prims_of(triangles);

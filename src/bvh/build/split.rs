@@ -6,6 +6,7 @@
 //! here parts are shared out by the square root of the area to be saved, which is what minimises the sum
 //! for needles (n parts of one have an n-th of its area).
 
+use super::MOST_ENTRIES;
 use super::prim::Prim;
 use crate::bvh::Aabb;
 use glam::{DVec3, Vec3};
@@ -19,7 +20,7 @@ const WORTH_SPLITTING: f64 = 0.1;
 const MOSTLY_SLIVERS: f64 = 0.5;
 /// No triangle has more parts.
 const MAX_PARTS: f64 = 4096.0;
-/// Never too many.
+/// Never too many, where a small mesh is mostly slivers.
 const FEW_PARTS: usize = 1000;
 
 /// How much of the boxes of triangles is empty.
@@ -64,11 +65,12 @@ impl Waste {
 
     /// How many more references than triangles there may be.
     fn budget(&self, triangles: usize) -> usize {
-        if self.roots > MOSTLY_SLIVERS * self.sizes {
+        let wanted = if self.roots > MOSTLY_SLIVERS * self.sizes {
             (triangles * 17 / 10).max((16 * triangles).min(FEW_PARTS))
         } else {
             triangles / 4
-        }
+        };
+        wanted.min(MOST_ENTRIES - triangles)
     }
 }
 
@@ -89,16 +91,20 @@ pub(super) fn split(prims: Vec<Prim>, waste: &Waste, triangles: &[[Vec3; 3]]) ->
     let parts: Vec<Vec<Prim>> = prims
         .par_chunks(1 << 12)
         .map(|piece| {
-            let mut parts = Vec::with_capacity(piece.len() * 5 / 4);
+            let wanted = |prim: &Prim, corners: &[Vec3; 3]| {
+                (root(prim.half_area(), least_half_area(corners)) * share).min(MAX_PARTS) as u32
+            };
+            let all = piece.iter().map(|prim| wanted(prim, &triangles[prim.index() as usize]) as usize + 1);
+            let mut parts = Vec::with_capacity(all.sum());
             for prim in piece {
                 let corners = &triangles[prim.index() as usize];
-                let root = root(prim.half_area(), least_half_area(corners));
-                let wanted = (root * share).min(MAX_PARTS) as u32;
+                let wanted = wanted(prim, corners);
                 split_one(&grid, &corners.map(Vec3::as_dvec3), prim.aabb(), prim.index(), wanted, &mut parts);
             }
             parts
         })
         .collect();
+    drop(prims);
     parts.concat()
 }
 
@@ -243,6 +249,16 @@ mod tests {
         assert!(covered(&triangles, &parts));
         parts.remove(parts.len() / 2);
         assert!(!covered(&triangles, &parts), "one is missing");
+    }
+
+    #[test]
+    fn there_are_never_more_parts_than_leaves_can_name() {
+        let needles = Waste { all: 1.0, slivers: 1.0, sizes: 1.0, roots: 1.0 };
+        for triangles in [1, 1000, 90_000_000, 100_000_000, super::super::MOST_TRIANGLES] {
+            let entries = triangles + needles.budget(triangles);
+            assert!(entries > triangles && entries <= MOST_ENTRIES, "{entries} of {triangles}");
+        }
+        assert_eq!(needles.budget(1_000_000), 1_700_000);
     }
 
     #[test]

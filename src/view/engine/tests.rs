@@ -1,5 +1,6 @@
 //! The engine without a window.
 
+use super::super::controls::{Notice, Notices};
 use super::super::input::{Drag, Press};
 use super::super::keymap::Hold;
 use super::*;
