@@ -307,6 +307,6 @@ fn edges_keep_their_samples_when_shares_are_found_anew() {
     }
     let gain = even.mean_square_from(&truth) / adaptive.mean_square_from(&truth);
     println!("squared error of even samples over adaptive ones: {gain:.2}");
-    // 39 by what the first eight samples say alone, with steps however small.
-    assert!(gain > 45.0, "{gain}");
+    // 39 by what the first eight samples say alone, with steps however small; 45 with the one mended, 38 with the other.
+    assert!(gain > 48.0, "{gain}");
 }
