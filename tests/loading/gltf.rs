@@ -335,3 +335,20 @@ fn a_texture_that_an_extension_gives_comes_before_the_core_one() {
     assert!(report.warnings().is_empty(), "{:?}", report.warnings());
     assert_eq!(world.query::<&Texture>().single(&world).unwrap().texels.texels, [[9, 8, 7, 255]]);
 }
+
+#[test]
+fn whole_numbers_may_be_written_with_a_point() {
+    let text = gltf_triangle("", "", "");
+    let members =
+        ["scene\":0", "nodes\":[0", "mesh\":0", "POSITION\":0", "bufferView\":0", "componentType\":5126"];
+    let members = members.iter().chain(&["count\":3", "byteOffset\":36", "buffer\":0", "byteLength\":96"]);
+    let pointed = members.fold(text.clone(), |text, member| {
+        assert_says(&text, member);
+        text.replace(member, &format!("{member}.0"))
+    });
+    let (mut world, report) = loaded("a.gltf", &pointed);
+    assert_eq!((report.triangles, report.warnings()), (1, Vec::new()));
+    let (mut plain, _) = loaded("a.gltf", &text);
+    assert_eq!(only_mesh(&mut world), only_mesh(&mut plain));
+    assert_says(&refusal("a.gltf", &text.replace("count\":3", "count\":3.5")), "line 3");
+}

@@ -3,8 +3,12 @@
 use super::*;
 
 fn material(statements: &str) -> (World, LoadReport) {
+    material_of("", statements)
+}
+
+fn material_of(header: &str, statements: &str) -> (World, LoadReport) {
     let obj = format!("mtllib a.mtl\n{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n");
-    let library = format!("newmtl m\n{statements}\n");
+    let library = format!("{header}newmtl m\n{statements}\n");
     let (red, blue) = (png([200, 100, 50, 255]), png([128, 128, 255, 255]));
     let files: [(&str, &[u8]); 4] =
         [("a.obj", obj.as_bytes()), ("a.mtl", library.as_bytes()), ("red.png", &red), ("blue.png", &blue)];
@@ -24,6 +28,27 @@ fn gloss_has_its_colour_and_its_exponent_from_pictures() {
         panic!("not glossy")
     };
     assert_eq!(texel(&world, texture), ([128, 128, 255, 200], Encoding::Srgb));
+}
+
+/// As Blender 5.0 writes a surface whose specular level and metalness are pictures; 128 is as strong as its index says.
+#[test]
+fn blender_writes_maps_of_gloss_and_metal_without_their_numbers() {
+    let header = "# Blender 5.0.1 MTL File: 'None'\n";
+    let statements = "Ns 250\nKd 1 1 1\nNi 1.5\nd 1\nillum 2\nmap_Ks blue.png\nmap_refl red.png";
+    let (mut world, report) = material_of(header, statements);
+    assert_eq!(report.warnings(), [""; 0]);
+    let seen = named::<Material>(&mut world, "m");
+    let Glossy::Ggx { metallic: 1.0, roughness: 0.5, texture } = seen.glossy else {
+        panic!("{:?}", seen.glossy)
+    };
+    assert_eq!(texel(&world, texture), ([255, 255, 200, 255], Encoding::Linear));
+    let layers = seen.layers.unwrap();
+    assert_eq!(layers.specular_color, Vec3::splat(2.0));
+    assert_eq!(texel(&world, layers.specular_color_texture), ([128, 128, 255, 255], Encoding::Linear));
+    // Of others nobody knows what they mean.
+    let warnings = material(statements).1.warnings().concat();
+    assert_says(&warnings, "map_Ks without Ks");
+    assert_says(&warnings, "`map_refl` is not supported");
 }
 
 #[test]

@@ -80,8 +80,7 @@ pub(super) fn load(
     let container = container::split(file, &bytes)?;
     let json = without_bom(container.json);
     check_head(file, json, sink)?;
-    let tree = parse_tree(file, json)?;
-    let more: More = parse(file, json)?;
+    let (tree, more) = parse_tree(file, json)?;
     sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
@@ -242,14 +241,17 @@ fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadEr
     })
 }
 
-/// The whole tree; once more without what `gltf::json` knows less of than the format if it fails: animations, of
-/// which it has only those of nodes, and scenes, to which it denies being empty.
-fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
-    let first = match parse(file, json) {
-        Ok(tree) => return Ok(tree),
-        Err(first) => first,
+/// The whole tree, and what is read a second time; once more where that fails without what `gltf::json` knows less of
+/// than the format (animations, of which it has only those of nodes; scenes, to which it denies being empty; whole
+/// numbers that some write as `4.0`).
+fn parse_tree(file: &str, json: &[u8]) -> Result<(Root, More), LoadError> {
+    let (tree, more) = match (parse(file, json), parse(file, json)) {
+        (Ok(tree), Ok(more)) => return Ok((tree, more)),
+        either => either,
     };
     let mut value: serde_json::Value = parse(file, json)?;
+    write_without_point(&mut value);
+    let more = more.or_else(|why| serde_json::from_value(value.clone()).map_err(|_| why))?;
     if let Some(root) = value.as_object_mut() {
         root.remove("animations");
         let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
@@ -257,7 +259,25 @@ fn parse_tree(file: &str, json: &[u8]) -> Result<Root, LoadError> {
             scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
         }
     }
-    serde_json::from_value(value).map_err(|_| first)
+    let tree = tree.or_else(|why| serde_json::from_value(value).map_err(|_| why))?;
+    Ok((tree, more))
+}
+
+/// Makes whole numbers of those that are written as `4.0`, to all depths (`serde_json` allows 128).
+fn write_without_point(value: &mut serde_json::Value) {
+    match value {
+        serde_json::Value::Number(number) => {
+            // Up to here all whole numbers are different numbers in double precision.
+            let whole =
+                number.as_f64().filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 2_f64.powi(53));
+            if let Some(whole) = whole {
+                *number = (whole as i64).into();
+            }
+        }
+        serde_json::Value::Array(items) => items.iter_mut().for_each(write_without_point),
+        serde_json::Value::Object(members) => members.values_mut().for_each(write_without_point),
+        _ => {}
+    }
 }
 
 /// Refuses other versions and required extensions; warns of extensions that are merely used.

@@ -43,7 +43,9 @@ pub(super) fn restate(material: &mut tobj::Material, version: Version) -> bool {
     let is_rough = material.shininess.is_some() || material.shininess_texture.is_some();
     let ambient = material.ambient.map_or(Vec3::ZERO, Vec3::from);
     let grey = |[r, g, b]: [f32; 3]| r == g && g == b;
-    let Some([gloss, ..]) = material.specular.filter(|&specular| grey(specular)) else { return false };
+    // A map of it stands alone.
+    let said = material.specular.or(material.specular_texture.is_some().then_some([1.0; 3]));
+    let Some([gloss, ..]) = said.filter(|&specular| grey(specular)) else { return false };
     let is_metal = matches!(model, 3 | 6);
     let is_black = material.diffuse == Some([0.0; 3]) && material.diffuse_texture.is_none();
     // Before 2.8 there was no such surface, and everything but glass was written with an index of 1.

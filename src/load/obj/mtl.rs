@@ -97,13 +97,14 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
             return Vec::new();
         }
     };
-    let tidied = tidy(library, &text, sink);
+    let version = blender::version(&text);
+    let tidied = tidy(library, &text, version.is_some(), sink);
     match tobj::load_mtl_buf(&mut tidied.as_bytes()) {
         Ok((mut materials, _)) => {
             let restated = |version| {
                 materials.iter_mut().filter_map(|m| blender::restate(m, version).then_some(())).count()
             };
-            if blender::version(&text).map_or(0, restated) > 0 {
+            if version.map_or(0, restated) > 0 {
                 let what =
                     "written by Blender: Ns says roughness, Ks the strength of gloss, illum 3 and 6 metal";
                 sink.decide(library, what);
@@ -128,7 +129,7 @@ const MAPS: [&str; 9] =
 const OTHERS: [&str; 7] = ["newmtl", "illum", "bump", "map_Ka", "disp", "decal", "refl"];
 
 /// Only statements that `tobj` parses, in its spelling; warns of the others.
-fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
+fn tidy(library: &str, text: &str, by_blender: bool, sink: &mut Sink<'_>) -> String {
     let mut tidied = String::with_capacity(text.len());
     let mut inside = false;
     let done: Result<(), std::fmt::Error> = lines::for_each(text, |Statement { line, keyword, rest }| {
@@ -150,7 +151,11 @@ fn tidy(library: &str, text: &str, sink: &mut Sink<'_>) -> String {
             .split_ascii_whitespace()
             .map(|word| word.parse().ok().filter(|v: &f32| v.is_finite()))
             .collect();
-        let keyword = if keyword == "bump" { "map_Bump" } else { keyword };
+        let keyword = match keyword {
+            "bump" => "map_Bump",
+            "map_refl" if by_blender => "map_Pm",
+            _ => keyword,
+        };
         match (keyword, values.as_deref()) {
             (color, Some([r, g, b, ..])) if COLORS.contains(&color) => {
                 writeln!(tidied, "{color} {r} {g} {b}")
@@ -212,15 +217,15 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         Vec3::from(color.to_array().map(|value| within(keyword, value, 0.0, 1.0)))
     };
     let has_texture = material.diffuse_texture.is_some();
+    let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
     let mut diffuse =
         unit("Kd", material.diffuse.map_or(Vec3::splat(if has_texture { 1.0 } else { 0.8 }), Vec3::from));
-    if material.specular.is_none() && material.specular_texture.is_some() {
+    if material.specular.is_none() && material.specular_texture.is_some() && !is_mapped(blender::GLOSS) {
         let what = "map_Ks without Ks, which says how much: left out";
         sink.ignored(file, &format!("material `{name}`"), what);
     }
     let mut specular = unit("Ks", material.specular.map_or(Vec3::ZERO, Vec3::from));
     let tint = unit("Tf", color(material, "Tf").unwrap_or(Vec3::ONE));
-    let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
     // A map alone is the value itself; what stands in for one that is not there is no lamp.
     let unsaid = if textures.has(material, "map_Ke") { Vec3::ONE } else { Vec3::ZERO };
     let emission = material.emissive.map_or(unsaid, Vec3::from).max(Vec3::ZERO);
@@ -269,6 +274,7 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     });
     if let Some(gloss) = scalar(material, blender::GLOSS) {
         layers.specular_color = Vec3::splat(gloss);
+        layers.specular_color_texture = textures.strength(material, sink);
     }
     layers.transmission = scalar(material, blender::THROUGH).map(|factor| Transmission {
         factor,

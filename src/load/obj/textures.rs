@@ -114,6 +114,11 @@ impl Textures {
         self.pair("gloss", ["map_Ks", "map_Ns"], Encoding::Srgb, material, sink, with_alpha)
     }
 
+    /// `map_Ks` as numbers.
+    pub(super) fn strength(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
+        self.pair("strength", ["map_Ks", ""], Encoding::Linear, material, sink, with_alpha)
+    }
+
     /// `map_Pr` in green and `map_Pm` in blue.
     pub(super) fn metal_and_roughness(
         &mut self,
