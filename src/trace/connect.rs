@@ -2,10 +2,11 @@
 
 use super::TraceScene;
 use super::bsdf::{Bsdf, Evaluated, Lobes};
-use super::integrator::{Batch, LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
+use super::emitter::Receiver;
+use super::integrator::Batch;
 use super::light::LightSample;
-use super::light_tree::Receiver;
 use super::lights::Pick;
+use super::path::{LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
 use super::sampler::Sampler;
 use super::surface::Interaction;
 use crate::bvh::{Hit, Ray};

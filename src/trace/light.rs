@@ -3,7 +3,7 @@
 //! All in render space. References: M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering",
 //! 4th ed., chapter 12 (area, cone and disc sampling).
 
-use super::light_tree::{Emitter, Receiver};
+use super::emitter::{Emitter, Receiver};
 use super::mesh_light::MeshLight;
 use super::shape_light::ShapeLight;
 use super::sky::SkyLight;

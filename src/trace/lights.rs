@@ -1,7 +1,8 @@
 //! All lights together: which to sample, and which a ray runs into.
 
+use super::emitter::{Emitter, Receiver};
 use super::light::FlatLight;
-use super::light_tree::{Emitter, LightTree, Receiver};
+use super::light_tree::LightTree;
 use super::shape_light::{ShapeHit, ShapeLight};
 use crate::bvh::{Aabb, Bvh, Probe, Ray, Shaft};
 use bevy_ecs::prelude::*;

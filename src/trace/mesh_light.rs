@@ -1,7 +1,8 @@
 //! Emissive meshes: their triangles as one light.
 
+use super::emitter::{Emitter, Receiver};
 use super::light::{LightSample, sample_at, sample_flat};
-use super::light_tree::{Emitter, LightTree, Receiver};
+use super::light_tree::LightTree;
 use super::spherical::{SphericalTriangle, meet, weights};
 use crate::bvh::Aabb;
 use glam::{Vec2, Vec3};

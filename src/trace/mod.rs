@@ -4,6 +4,7 @@
 //! a tile together, wave by wave, through [`TraceScene`].
 
 pub mod allot;
+mod arrive;
 pub mod block;
 pub mod blocker;
 pub mod bsdf;
@@ -11,6 +12,7 @@ pub mod camera;
 mod connect;
 pub mod convergence;
 mod diffuse;
+pub mod emitter;
 pub mod explain;
 pub mod film;
 pub mod first;
@@ -22,6 +24,7 @@ pub mod lights;
 pub mod mesh_light;
 pub mod noise;
 pub mod pass;
+mod path;
 pub mod place;
 pub mod quad;
 mod quad_arrivals;

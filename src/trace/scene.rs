@@ -1,7 +1,7 @@
 //! The scene as rays need it: flat arrays, indices for references.
 
 use super::bsdf::Passed;
-use super::light_tree::Receiver;
+use super::emitter::Receiver;
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};

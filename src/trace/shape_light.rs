@@ -1,7 +1,7 @@
 //! Area lights with a shape of their own: sampled like all lights, and solid to rays.
 
+use super::emitter::Emitter;
 use super::light::{LightSample, error_of, sample_at, sample_flat};
-use super::light_tree::Emitter;
 use super::quad::Quad;
 use super::spherical::{SphericalQuad, meet, weights};
 use super::warp::{cone, cone_pdf, offset, uniform_sphere};

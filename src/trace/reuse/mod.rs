@@ -20,7 +20,8 @@ pub(super) use group::even_out;
 
 use super::TraceScene;
 use super::film::Tile;
-use super::integrator::{Batch, Path, Work};
+use super::integrator::{Batch, Work};
+use super::path::Path;
 use super::sampler::Sampler;
 use crate::bvh::Ray;
 use glam::{UVec2, Vec3};
