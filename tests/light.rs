@@ -12,7 +12,7 @@
 mod stage;
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use penumbra::scene::{Emission, Light, Material};
+use penumbra::scene::{Emission, Light, Material, Transform, TriangleMesh};
 use penumbra::torture::light::oracle;
 use penumbra::trace::Integrator;
 use stage::{Estimate, Exact as _, Frames as _, Stage, quad, reds, settings};
@@ -149,6 +149,58 @@ fn point_and_spot_light_fall_with_the_distance_squared() {
             }
         }
     }
+}
+
+/// On the axis of a spot it is as bright however narrow that is; hard ones are.
+#[test]
+fn narrow_spots_are_as_bright() {
+    for degrees in [30.0_f32, 1.0, 0.05, 0.02] {
+        for inner in [0.5, 0.999, 1.0] {
+            let outer_angle = degrees.to_radians();
+            let light = Light::Spot { intensity: Vec3::ONE, inner_angle: inner * outer_angle, outer_angle };
+            let spot = |stage: &mut Stage| {
+                stage.add(
+                    light.clone(),
+                    Transform::looking_at(v(0.3, 1.7, 0.2), v(0.0, 0.0, 0.0), DVec3::Y).0,
+                );
+            };
+            let distance2 = v(0.3, 1.7, 0.2).length_squared();
+            let expected = 1.7 / distance2.powf(1.5);
+            let found = irradiance_with(16, v(0.0, 0.0, 0.0), DVec3::Y, spot).mean;
+            // What is seen has some extent.
+            assert!((found / expected - 1.0).abs() < 1e-2, "{degrees} {inner}: {found} {expected}");
+        }
+    }
+}
+
+/// Of few shining triangles the small one beside two that are very large and far away.
+#[test]
+fn a_small_triangle_among_huge_ones_is_sampled() {
+    let half = 1e4_f32;
+    let far = |x: f32, z: f32| Vec3::new(x * half, 3e4, z * half);
+    let near = |x: f32, z: f32| Vec3::new(x * 0.5, 1.2, z * 0.5);
+    let square = |at: &dyn Fn(f32, f32) -> Vec3| [at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)];
+    let lamp = |corners: Vec<Vec3>| TriangleMesh {
+        triangles: (0..corners.len() as u32 / 4)
+            .flat_map(|i| [[0, 1, 2], [0, 2, 3]].map(|t| t.map(|k| 4 * i + k)))
+            .collect(),
+        positions: corners,
+        ..TriangleMesh::default()
+    };
+    let (large, small) = (square(&far), square(&near));
+    let shining = Material { double_sided: true, ..Material::emissive(Vec3::ONE) };
+    let lit = |meshes: &[Vec<Vec3>]| {
+        irradiance_with(256, v(0.0, 0.0, 0.0), DVec3::Y, |stage| {
+            for corners in meshes {
+                stage.add_mesh(lamp(corners.clone()), shining.clone(), DAffine3::IDENTITY);
+            }
+        })
+    };
+    let together = lit(&[[large, small].concat()]);
+    let apart = lit(&[large.to_vec(), small.to_vec()]);
+    let sigma = together.sigma.hypot(apart.sigma);
+    println!("together {together:?}, apart {apart:?}");
+    assert!((together.mean - apart.mean).abs() < 4.5 * sigma && sigma < 0.01 * apart.mean);
 }
 
 #[test]

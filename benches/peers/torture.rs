@@ -319,7 +319,7 @@ fn own_hits(maker: &Maker<'_>, triangles: u64) -> (u64, u64) {
         let corners = [(); 3].map(|()| Vec3::ZERO.map(|_| rng.decades(-8.0, 8.0)));
         let Some(alone) = Alone::new(mesh(&[corners]), glam::DAffine3::IDENTITY) else { continue };
         let tracer = (maker.make)(&[corners]);
-        let rays = rays_off(&alone, &mut rng, 500, Interaction::origin_toward);
+        let (rays, _) = rays_off(&alone, &mut rng, 500, Interaction::origin_toward);
         hits += rays.iter().filter(|ray| tracer.any_hit(ray)).count() as u64;
         tried += rays.len() as u64;
     }

@@ -207,9 +207,11 @@ impl Probe {
     /// Where the ray meets the triangle's plane; not a number if it has none.
     #[inline(always)]
     fn plane(&self, corners: &[Vec3; 3]) -> f64 {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let normal = (b - a).cross(c - a);
-        normal.dot(a - self.origin.as_dvec3()) / normal.dot(self.direction.as_dvec3())
+        let corners = corners.map(Vec3::as_dvec3);
+        let normal = cross(&corners);
+        let [a, b, c] = corners.map(|p| p - self.origin.as_dvec3());
+        let nearer = |p: DVec3, q: DVec3| if q.length_squared() < p.length_squared() { q } else { p };
+        normal.dot(nearer(nearer(a, b), c)) / normal.dot(self.direction.as_dvec3())
     }
 
     /// Of the farthest corner, in multiples of the direction.
@@ -256,6 +258,21 @@ impl Probe {
         let [t, u, v] = [t, v / determinant, w / determinant].map(|x| x as f32);
         Some(TriangleHit { t, u, v })
     }
+}
+
+/// The normal of a triangle by its right-hand rule, twice as long as its area is large: of its two shorter edges. Two of a
+/// needle's long ones are parallel but for what their difference has lost.
+#[inline(always)]
+#[must_use]
+pub fn cross([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    let edges = [*b - *a, *c - *b, *a - *c];
+    let [ab, bc, ca] = edges.map(DVec3::length_squared);
+    let select = |which: bool, yes: DVec3, no: DVec3| DVec3::select(glam::BVec3::splat(which), yes, no);
+    let longest_ab = ab > bc.max(ca);
+    let longest_bc = bc > ca;
+    let first = select(longest_ab, edges[1], select(longest_bc, edges[2], edges[0]));
+    let second = select(longest_ab, edges[2], select(longest_bc, edges[0], edges[1]));
+    first.cross(second)
 }
 
 /// A hit that counts.

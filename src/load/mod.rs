@@ -198,11 +198,6 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         sink.decide(&file, format!("its sky is {}", path.display()));
     }
     check_animation(&file, sink)?;
-    // Before the edits: what is moved by hand stands where it was put.
-    set_in_motion(sink.world);
-    for settings in &settings {
-        settings.apply_edits(sink)?;
-    }
     sink.begin(Phase::Framing);
     pose(sink.world);
     for name in materials.unused() {
@@ -214,6 +209,12 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     }
     sink.count();
     framing::complete(&file, active, sink);
+    // After the animations, so that what is moved by hand stands where it was put; and after all that is decided by the scene's
+    // extent and lights, since who edits it has those before his eyes.
+    for settings in &settings {
+        settings.apply_edits(sink)?;
+    }
+    pose(sink.world);
     Ok(())
 }
 

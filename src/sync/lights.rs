@@ -92,8 +92,8 @@ fn flatten(
             position,
             axis: axis()?,
             intensity,
-            cos_inner: inner_angle.cos(),
-            cos_outer: outer_angle.cos(),
+            inner: 2.0 * (0.5 * inner_angle).sin().powi(2),
+            outer: 2.0 * (0.5 * outer_angle).sin().powi(2),
         }),
         Light::Directional { irradiance, angle } => {
             let sin2_radius = (0.5 * angle).sin().powi(2);

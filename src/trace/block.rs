@@ -10,6 +10,7 @@ use super::surface::{Interaction, UNIT};
 use super::warp::{cosine_hemisphere, offset};
 use crate::bvh::Isa;
 use crate::bvh::simd::{Job, Simd};
+use crate::bvh::triangle::cross;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -219,7 +220,7 @@ fn on_triangle(block: &Block, i: usize) -> (DVec3, DVec3) {
     let b = block.corners[1].get(i).as_dvec3();
     let c = block.corners[2].get(i).as_dvec3();
     let (u, v) = (f64::from(block.weights.0[0][i]), f64::from(block.weights.0[1][i]));
-    (a * (1.0 - u - v) + b * u + c * v, (b - a).cross(c - a))
+    (a * (1.0 - u - v) + b * u + c * v, cross(&[a, b, c]))
 }
 
 #[inline(always)]

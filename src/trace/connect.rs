@@ -5,7 +5,7 @@ use super::bsdf::{Bsdf, Evaluated, Lobes};
 use super::emitter::Receiver;
 use super::integrator::Batch;
 use super::light::LightSample;
-use super::lights::Pick;
+use super::lights::{KNOWN_LIGHTS, Pick};
 use super::path::{LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
 use super::sampler::Sampler;
 use super::surface::Interaction;
@@ -47,10 +47,14 @@ pub(super) fn looks<'a>(
         let members = scene.light_samples(depth, (!by_chance).then_some(index as u32));
         (0..members).map(move |member| {
             let sampler = sampler.member([member, members]);
-            let random = if by_chance { sampler.pair(base + PICK).x } else { 0.0 };
-            let mut pick = scene.lights.pick(depth, index, &to, random);
+            let u = sampler.pair(base + LIGHT + index as u32 * 2);
+            // One number for which light and where on it, so that samples are spread over all of them together; of very many it
+            // has not digits enough.
+            let is_one = scene.lights.len() <= KNOWN_LIGHTS;
+            let random = if by_chance && !is_one { sampler.pair(base + PICK).x } else { u.x };
+            let (mut pick, rest) = scene.lights.pick(depth, index, &to, random);
             pick.chance *= members as f32;
-            Look { pick, sampler, u: sampler.pair(base + LIGHT + index as u32 * 2) }
+            Look { pick, sampler, u: if is_one { Vec2::new(rest, u.y) } else { u } }
         })
     })
 }

@@ -32,10 +32,10 @@ pub enum FlatLight {
         axis: Vec3,
         /// Radiant intensity on the axis, W/sr.
         intensity: Vec3,
-        /// Cosine of the half angle of full intensity.
-        cos_inner: f32,
-        /// Cosine of the half angle of darkness, below `cos_inner`.
-        cos_outer: f32,
+        /// One minus the cosine of the half angle of full intensity: of narrow ones the cosine itself has no digits.
+        inner: f32,
+        /// The same of the half angle of darkness.
+        outer: f32,
     },
     /// A disc infinitely far away.
     Directional {
@@ -115,9 +115,10 @@ impl FlatLight {
                 let (wi, distance2) = direction(point, *position)?;
                 Some(LightSample::new(wi, Some(*position), *intensity / distance2, None))
             }
-            Self::Spot { position, axis, intensity, cos_inner, cos_outer } => {
+            Self::Spot { position, axis, intensity, inner, outer } => {
                 let (wi, distance2) = direction(point, *position)?;
-                let ramp = (axis.dot(-wi) - cos_outer) / (cos_inner - cos_outer).max(1e-6);
+                let aside = 0.5 * (*axis + wi).length_squared();
+                let ramp = (outer - aside) / (outer - inner).max(f32::MIN_POSITIVE);
                 let share = ramp.clamp(0.0, 1.0).powi(2);
                 (share > 0.0)
                     .then(|| LightSample::new(wi, Some(*position), *intensity * (share / distance2), None))

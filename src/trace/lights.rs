@@ -144,27 +144,29 @@ impl Lights {
         if self.samples_all(depth) { self.lights.len() } else { 1 }
     }
 
-    /// Pick number `index` of [`Lights::picks`]; `random` in [0, 1) chooses if not all are taken.
+    /// Pick number `index` of [`Lights::picks`]; `random` in [0, 1) chooses if not all are taken. Also what is left of it, a
+    /// fresh number.
     #[must_use]
-    pub fn pick(&self, depth: u32, index: usize, to: &Receiver, random: f32) -> Pick {
+    pub fn pick(&self, depth: u32, index: usize, to: &Receiver, random: f32) -> (Pick, f32) {
         if self.samples_all(depth) {
-            return Pick { light: index as u32, chance: 1.0 };
+            return (Pick { light: index as u32, chance: 1.0 }, random);
         }
         if random < EVENLY {
-            let light = (random / EVENLY * self.lights.len() as f32) as usize;
-            let light = light.min(self.lights.len() - 1) as u32;
-            return Pick { light, chance: self.chance(depth, light, to) };
+            let place = random / EVENLY * self.lights.len() as f32;
+            let light = (place as usize).min(self.lights.len() - 1) as u32;
+            return (Pick { light, chance: self.chance(depth, light, to) }, place.fract());
         }
         let rest = (random - EVENLY) / (1.0 - EVENLY) * self.groups();
         if let Some(&light) = self.unplaced.get(rest as usize) {
-            return Pick { light, chance: self.mixed(1.0) };
+            return (Pick { light, chance: self.mixed(1.0) }, rest.fract());
         }
         if let Some(chosen) = self.tree.sample(to, rest.fract()) {
-            return Pick { light: self.placed[chosen.emitter], chance: self.mixed(chosen.chance) };
+            let light = self.placed[chosen.emitter];
+            return (Pick { light, chance: self.mixed(chosen.chance) }, chosen.rest);
         }
         // Only where the last of a group was missed by rounding.
         let light = self.lights.len() as u32 - 1;
-        Pick { light, chance: self.chance(depth, light, to) }
+        (Pick { light, chance: self.chance(depth, light, to) }, random)
     }
 
     /// The [`Pick::chance`] of `light` after `depth` bounces.
@@ -325,7 +327,7 @@ mod tests {
         assert!((chances.iter().sum::<f64>() - 1.0).abs() < 1e-6, "{chances:?}");
         let (mut counts, count) = ([0.0; 22], 1 << 16);
         for i in 0..count {
-            let pick = lights.pick(0, 0, &to, (i as f32 + 0.5) / count as f32);
+            let (pick, _) = lights.pick(0, 0, &to, (i as f32 + 0.5) / count as f32);
             let chance = chances[pick.light as usize];
             assert!((f64::from(pick.chance) / chance - 1.0).abs() < 1e-5, "{pick:?} {chance}");
             counts[pick.light as usize] += 1.0 / f64::from(count);

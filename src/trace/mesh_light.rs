@@ -30,16 +30,18 @@ pub struct MeshLight {
     luminance: f32,
 }
 
-/// Up to this many are chosen by their area alone: there is little to be won.
+/// Up to this many are chosen by their area alone: there is little to be won, if none is much smaller than others.
 pub(super) const FEW: usize = 16;
+/// So many times smaller than their mean.
+const UNEVEN: f32 = 16.0;
 /// So often one of many is chosen by its area: what it is expected to bring does not know what is in between.
 const BY_AREA: f32 = 0.25;
 
 impl MeshLight {
-    /// Whether a tree chooses among its triangles.
+    /// Whether the choice among its triangles matters more than the place on one.
     #[must_use]
     pub fn is_many(&self) -> bool {
-        !self.tree.is_empty()
+        self.triangles.len() > FEW
     }
 
     /// Of the triangles of an instance (numbers in its mesh, rising, and corners in render space) that shine with
@@ -83,7 +85,9 @@ impl MeshLight {
         };
         let emitters: Vec<Emitter> = light.corners.iter().zip(&areas).map(flat).collect();
         light.shape = emitters.iter().copied().reduce(|all, more| all.union(&more))?;
-        if emitters.len() > FEW {
+        let mean = (total / areas.len() as f64) as f32;
+        let is_even = areas.iter().all(|area| *area * UNEVEN >= mean);
+        if emitters.len() > FEW || !is_even {
             light.tree = Arc::new(LightTree::new(&emitters));
         }
         Some(light)

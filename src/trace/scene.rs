@@ -5,6 +5,7 @@ use super::emitter::Receiver;
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
+use crate::bvh::triangle::cross;
 use crate::bvh::{Accept, Hit, Ray, Tlas};
 use crate::scene::{Alpha, Body, Glossy, Layers, Material, NormalMap, Texture, TriangleMesh};
 use bevy_ecs::prelude::*;
@@ -233,9 +234,9 @@ impl<'a> TraceScene<'a> {
         if !surface.material.culled {
             return false;
         }
-        let [a, b, c] = instance.mesh.corners(hit.triangle as usize).map(Vec3::as_dvec3);
+        let corners = instance.mesh.corners(hit.triangle as usize).map(Vec3::as_dvec3);
         // The inverse transpose keeps sides, also under a mirroring placement.
-        (instance.normal_matrix * (b - a).cross(c - a)).dot(ray.direction.as_dvec3()) > 0.0
+        (instance.normal_matrix * cross(&corners)).dot(ray.direction.as_dvec3()) > 0.0
     }
 
     /// For each ray whether something is there, not counting the triangle `ignored` of it, (instance,

@@ -4,6 +4,7 @@ use super::TraceScene;
 use super::bsdf::Bsdf;
 use super::scene::{InstanceData, both_uvs, interpolate};
 use super::warp::offset;
+use crate::bvh::triangle::cross;
 use crate::bvh::{Hit, Ray};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
@@ -84,7 +85,7 @@ impl Interaction {
 
         // In double precision the point lies in the plane whatever the rounding of u and v.
         let local = barycentric(&corners, hit);
-        let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(DVec3::Z);
+        let facet = cross(&corners).normalize_or(DVec3::Z);
         // Most things are where their mesh is.
         let (position, spread, facet) = if placement.is_identity() {
             (local, local.abs(), facet)

@@ -181,6 +181,18 @@ fn zero_times_infinity_is_found() {
     finds(&checks, "flat box");
 }
 
+/// Seeds of which needles were hit from outside as long as their normals came of their two long edges.
+#[test]
+fn no_ray_comes_back_to_a_needle_either() {
+    let (progress, interrupt) = (|_: Step| {}, AtomicBool::new(false));
+    for seed in [5, 7, 27] {
+        let trial = Trial { effort: Effort::Normal, seed, progress: &progress, interrupt: &interrupt };
+        for check in leave::own_hits(&trial, Interaction::origin_toward) {
+            assert!(check.holds(), "seed {seed}, {}: {} of {}", check.what, check.ours, check.tried);
+        }
+    }
+}
+
 fn fixed_epsilon(at: &Interaction, direction: Vec3) -> Vec3 {
     let side = if at.geometric_normal.dot(direction) < 0.0 { -1e-4 } else { 1e-4 };
     at.position + at.geometric_normal * side

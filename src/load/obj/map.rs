@@ -6,6 +6,33 @@ use bevy_ecs::prelude::*;
 use glam::{Affine2, Vec2, Vec3};
 use std::sync::Arc;
 
+/// The options, and how many words follow them.
+fn arguments_of(option: &str) -> Option<usize> {
+    match option {
+        "-mm" => Some(2),
+        "-s" | "-o" | "-t" => Some(3),
+        "-blendu" | "-blendv" | "-boost" | "-bm" | "-cc" | "-clamp" | "-colorspace" | "-imfchan"
+        | "-texres" | "-type" => Some(1),
+        _ => None,
+    }
+}
+
+/// The statement with options that some programs write behind the name where they belong, before it.
+pub(super) fn options_first(statement: &str) -> String {
+    let is_option = |(at, _): &(usize, &str)| {
+        let option = statement[at + 1..].split_ascii_whitespace().next().unwrap_or_default();
+        // A name has an ending; what comes before is arguments.
+        let name = statement[..*at].split_ascii_whitespace().next_back().unwrap_or_default();
+        let has_ending =
+            name.rsplit_once('.').is_some_and(|(_, ending)| ending.starts_with(char::is_alphabetic));
+        arguments_of(option).is_some() && has_ending
+    };
+    match statement.match_indices(" -").find(is_option) {
+        Some((at, _)) => format!("{} {}", &statement[at + 1..], &statement[..at]),
+        None => statement.to_owned(),
+    }
+}
+
 /// A texture statement: options, then a file name that may have spaces.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Map<'a> {
@@ -33,13 +60,7 @@ impl<'a> Map<'a> {
             range: Vec2::Y,
         };
         while let Some(option) = map.name.strip_prefix('-').and_then(|_| first_word(map.name)) {
-            let arguments = match option {
-                "-mm" => 2,
-                "-s" | "-o" | "-t" => 3,
-                "-blendu" | "-blendv" | "-boost" | "-bm" | "-cc" | "-clamp" | "-colorspace" | "-imfchan"
-                | "-texres" | "-type" => 1,
-                _ => break,
-            };
+            let Some(arguments) = arguments_of(option) else { break };
             let mut rest = map.name[option.len()..].trim_start();
             let mut vector = match option {
                 "-s" => Vec2::ONE,

@@ -33,7 +33,7 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3};
 use raw::Raw;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 /// Reads `bytes` and puts mesh and materials on `root`.
@@ -61,6 +61,7 @@ pub(super) fn load(
         Some(_) => BTreeMap::new(),
         None => mtl::spawn_all(file, folder, &raw.libraries, overrides, sink),
     };
+    let library = Library::new(&library);
     let materials: Vec<Entity> = raw
         .materials
         .iter()
@@ -85,11 +86,34 @@ pub(super) fn load(
     Ok(())
 }
 
+/// Materials by their names, and by what is left of these where people are less exact; the first of each counts.
+struct Library<'a> {
+    exact: &'a BTreeMap<String, Entity>,
+    bare: HashMap<&'a str, Entity>,
+    lower: HashMap<String, (&'a str, Entity)>,
+}
+
+impl<'a> Library<'a> {
+    fn new(exact: &'a BTreeMap<String, Entity>) -> Self {
+        let (mut bare, mut lower) = (HashMap::new(), HashMap::new());
+        for (name, &entity) in exact {
+            bare.entry(bare_name(name)).or_insert(entity);
+            lower.entry(name.to_lowercase()).or_insert((name.as_str(), entity));
+        }
+        Self { exact, bare, lower }
+    }
+}
+
+/// Names may have `#` in them; where none is defined so, it begins a comment.
+fn bare_name(name: &str) -> &str {
+    lines::unquoted(lines::before_comment(name))
+}
+
 /// The entity for a `usemtl` name, or for faces before the first one.
 fn material_entity(
     file: &str,
     name: Option<&str>,
-    library: &BTreeMap<String, Entity>,
+    library: &Library<'_>,
     overrides: &mut Materials,
     sink: &mut Sink<'_>,
 ) -> Entity {
@@ -100,18 +124,14 @@ fn material_entity(
         sink.decide(file, "surfaces without a material are light grey");
         return sink.spawn((Name::new("default"), Material::default()));
     };
-    // Names may have `#` in them; where none is defined so, it begins a comment.
-    let bare = |name| lines::unquoted(lines::before_comment(name));
-    let same = || library.iter().find(|(other, _)| bare(other) == bare(name)).map(|(_, entity)| entity);
-    if let Some(&known) = library.get(name).or_else(same) {
+    if let Some(&known) = library.exact.get(name).or_else(|| library.bare.get(bare_name(name))) {
         return known;
     }
     if let Some(replacement) = overrides.replacement(name) {
         return replacement;
     }
     let short: String = name.chars().take(80).collect();
-    let lower = name.to_lowercase();
-    if let Some((other, &entity)) = library.iter().find(|(other, _)| other.to_lowercase() == lower) {
+    if let Some(&(other, entity)) = library.lower.get(&name.to_lowercase()) {
         sink.repaired(file, "", format!("material `{short}` is defined as `{other}`"));
         return entity;
     }

@@ -28,7 +28,7 @@ pub(super) fn spawn_all(
     // Some programs repeat the statement for every object.
     let mut unread: BTreeSet<&String> = libraries.iter().collect();
     let in_order = libraries.iter().filter(|&statement| unread.remove(statement));
-    let mut known = BTreeSet::new();
+    let (mut known, mut lost) = (BTreeSet::new(), Vec::new());
     for (i, library) in in_order.flat_map(|statement| libraries_of(folder, statement)).enumerate() {
         if i == MOST_LIBRARIES {
             sink.ignored(file, "", format!("material libraries after the first {MOST_LIBRARIES}"));
@@ -41,9 +41,25 @@ pub(super) fn spawn_all(
             Ok(bytes) => parsed.extend(parse(file, &library, &bytes, sink)),
             Err(why) => {
                 let what = format!("material library `{library}`: {why}; its materials are light grey");
-                sink.repaired(file, "", what);
+                lost.push(what);
             }
         }
+    }
+    // The scene was given another name, and its library with it.
+    let own = format!("{}.mtl", file.strip_suffix(".obj").unwrap_or(file));
+    let own = own.rsplit(['/', '\\']).next().unwrap_or(&own);
+    if parsed.is_empty()
+        && !known.contains(own)
+        && folder.has(own)
+        && let Ok(bytes) = folder.read_or_neighbour(own, TEXT_LIMIT)
+    {
+        parsed = parse(file, own, &bytes, sink);
+        let what = format!("material library `{own}` beside it is taken: it names none that is there");
+        sink.repaired(file, "", what);
+        lost.clear();
+    }
+    for what in lost {
+        sink.repaired(file, "", what);
     }
     let mut textures = Textures::new(file, folder, &parsed, sink);
     let mut entities = BTreeMap::new();
@@ -175,7 +191,7 @@ fn tidy(library: &str, text: &str, by_blender: bool, sink: &mut Sink<'_>) -> Str
                 if rest.is_empty() {
                     ignore("without a file name, ignored")
                 } else {
-                    writeln!(tidied, "{map} {}", map::beside(library, rest))
+                    writeln!(tidied, "{map} {}", map::beside(library, &map::options_first(rest)))
                 }
             }
             ("disp" | "decal" | "refl", _) => {
@@ -203,6 +219,9 @@ fn color(material: &tobj::Material, keyword: &str) -> Option<Vec3> {
 fn scalar(material: &tobj::Material, keyword: &str) -> Option<f32> {
     material.unknown_param.get(keyword)?.parse().ok()
 }
+
+/// Below this exponent of Blinn-Phong there is no highlight to be seen.
+const LEAST_EXPONENT: f32 = 2.0;
 
 fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink: &mut Sink<'_>) -> Material {
     let name = &material.name;
@@ -296,9 +315,14 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let is_bent = material.optical_density.is_some_and(|ior| ior > 1.0) && opacity == 1.0;
     let is_tinted = tint != Vec3::ONE && tint != Vec3::ZERO;
     let is_black = diffuse == Vec3::ZERO && !has_texture;
-    let is_glass = passes && (is_bent || is_tinted || is_black);
+    let is_glass = passes && (is_bent || is_tinted || is_black) && !has_texture;
+    if is_glass && material.diffuse.is_some() && !is_black && diffuse != Vec3::ONE {
+        let what = format!("illum {model} is glass: its Kd is not seen");
+        sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);
+    }
     if passes && !is_glass {
         let what = match opacity < 1.0 {
+            _ if has_texture => format!("illum {model} with map_Kd: no glass, but its picture"),
             true => format!("illum {model} with d {opacity}: half-transparent, no glass"),
             false => format!("illum {model} without Ni above 1, Tf or black Kd: no glass, but its Kd"),
         };
@@ -311,6 +335,14 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         diffuse = Vec3::ONE;
     }
     let is_mirror = matches!(model, 3 | 5) && specular != Vec3::ZERO;
+    // Many programs write a Ks for all materials, and an exponent of 0 or 1 or none where there is no highlight: the lobe would
+    // be as wide as Kd's and wash it out.
+    let has_highlight = exponent >= LEAST_EXPONENT || material.shininess_texture.is_some();
+    if pbr.is_none() && !is_glass && !is_mirror && model >= 2 && specular != Vec3::ZERO && !has_highlight {
+        let what = format!("Ks with Ns below {LEAST_EXPONENT}, or none: no highlight, its Kd alone");
+        sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);
+        specular = Vec3::ZERO;
+    }
     let uses_specular = pbr.is_none() && !is_glass && (is_mirror || (model >= 2 && specular != Vec3::ZERO));
     let most = (diffuse + specular).max_element();
     if uses_specular && most > 1.0 {
@@ -320,7 +352,12 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         specular /= most;
     }
     let base_color_texture = if is_glass { None } else { textures.color(material, sink) };
-    let transparent = opacity < 1.0 || material.dissolve_texture.is_some();
+    let is_cut_out = !is_glass && textures.has_cut_outs(material);
+    if is_cut_out {
+        let what = "map_Kd has an alpha channel: it says what is there";
+        sink.remark(Kind::Decided, file, &format!("material `{name}`"), what.to_owned(), 1);
+    }
+    let transparent = opacity < 1.0 || material.dissolve_texture.is_some() || is_cut_out;
     Material {
         base_color: if is_glass { Vec3::ZERO } else { diffuse },
         base_color_texture,

@@ -117,9 +117,9 @@ impl Raw {
             return Err(format!("vertex of {count} coordinates instead of 3"));
         }
         self.places.push(DVec3::new(values[0], values[1], values[2]));
-        // Six numbers end in a colour; seven have a weight before it.
-        let color =
-            if count >= 6 { Some(DVec3::from_slice(&values[count - 3..count]).as_vec3()) } else { None };
+        // Six numbers end in a colour; of seven the last is its alpha or, if the fourth could be that alone, the fourth a weight.
+        let first = if count == 7 && values[3] == 1.0 && values[6] != 1.0 { 4 } else { 3 };
+        let color = (count >= 6).then(|| DVec3::from_slice(&values[first..first + 3]).as_vec3());
         if color.is_some() && self.colors.is_empty() {
             self.colors.resize(self.places.len() - 1, Vec3::ONE);
         }

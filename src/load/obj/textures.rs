@@ -104,6 +104,17 @@ impl Textures {
         statement(material, keyword).is_some_and(|map| !self.missing.contains(Map::parse(map).name))
     }
 
+    /// Whether the alpha channel of `map_Kd` says what is there: where nothing else does, and there is more than one value.
+    pub(super) fn has_cut_outs(&self, material: &tobj::Material) -> bool {
+        let is_said = material.dissolve.is_some_and(|d| d < 1.0) || statement(material, "map_d").is_some();
+        let picture = statement(material, "map_Kd").map(Map::parse).filter(Map::is_plain);
+        let picture = picture.and_then(|map| self.images.get(map.name)).filter(|_| !is_said);
+        picture.is_some_and(|picture| {
+            let is_through = |texel: &[u8; 4]| texel[3] < 128;
+            picture.texels.iter().any(is_through) && !picture.texels.iter().all(is_through)
+        })
+    }
+
     /// `map_Kd` with the alpha of `map_d`.
     pub(super) fn color(&mut self, material: &tobj::Material, sink: &mut Sink<'_>) -> Option<TextureUse> {
         self.pair("color", ["map_Kd", "map_d"], Encoding::Srgb, material, sink, with_alpha)

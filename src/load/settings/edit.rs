@@ -200,7 +200,7 @@ pub fn set_sizes(light: &mut Light, wanted: &[f32]) -> bool {
     let positive = |size: f32| size > 0.0 && size.is_finite();
     match (light, wanted) {
         (Light::Spot { inner_angle, outer_angle, .. }, &[inner, outer])
-            if inner >= 0.0 && inner < outer && outer <= std::f32::consts::FRAC_PI_2 =>
+            if inner >= 0.0 && inner <= outer && outer <= std::f32::consts::FRAC_PI_2 =>
         {
             (*inner_angle, *outer_angle) = (inner, outer);
             true

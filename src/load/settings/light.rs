@@ -193,8 +193,8 @@ fn convert(table: &LightTable, check: &mut Check) -> (&'static str, Transform, L
             let position = check.point("position", *position);
             let target = check.point("target", *target);
             check.that(position != target, || "position and target are the same point".to_owned());
-            check.that(*inner_angle >= 0.0 && inner_angle < outer_angle && *outer_angle <= 90.0, || {
-                format!("angles must be 0 <= inner_angle < outer_angle <= 90 degrees, not {inner_angle} and {outer_angle}")
+            check.that(*inner_angle >= 0.0 && inner_angle <= outer_angle && *outer_angle <= 90.0, || {
+                format!("angles must be 0 <= inner_angle <= outer_angle <= 90 degrees, not {inner_angle} and {outer_angle}")
             });
             let light = Light::Spot {
                 intensity: check.spectrum("intensity", *intensity),

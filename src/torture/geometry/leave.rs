@@ -46,14 +46,14 @@ fn start(alone: &Alone, rng: &mut Rng, number: u32, direction: impl Fn(Vec3) -> 
 }
 
 /// Rays from points of one triangle: half without an end, half to points of any size with `t_max` 1 (pbrt's tests
-/// `Triangle.Reintersect`), but none to the triangle's plane.
+/// `Triangle.Reintersect`), but none to the triangle's plane. Also how many of these had to be left out.
 #[must_use]
-pub fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec<Ray> {
-    let mut rays = Vec::with_capacity(count);
+pub fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> (Vec<Ray>, u64) {
+    let (mut rays, mut left_out) = (Vec::with_capacity(count), 0);
     let placed = *alone.geometry.tlas.placements()[0].world_from_local();
     let corners = alone.geometry.instances[0].mesh.corners(0).map(|p| placed.transform_point3(p.as_dvec3()));
-    while rays.len() < count {
-        let endless = rays.len() < count / 2;
+    for number in 0..count {
+        let endless = number < count / 2;
         let target = Vec3::ZERO.map(|_| rng.decades(-8.0, 8.0));
         let toward = rng.direction();
         let (at, direction) = start(alone, rng, 0, |from| if endless { toward } else { target - from });
@@ -66,9 +66,11 @@ pub fn rays_off(alone: &Alone, rng: &mut Rng, count: usize, leave: Leave) -> Vec
         let apart = endless || is_apart(&corners, target, &spread(&placed, target, origin));
         if apart && ray.direction != Vec3::ZERO && ray.direction.is_finite() {
             rays.push(ray);
+        } else {
+            left_out += 1;
         }
     }
-    rays
+    (rays, left_out)
 }
 
 /// What the end of a ray is rounded in proportion to, along each axis: coordinates of both ends; and where they are
@@ -84,9 +86,15 @@ fn spread(placed: &DAffine3, target: Vec3, origin: Vec3) -> DVec3 {
 /// Whether the end of a ray is not in the plane of a triangle, as far as floats can tell: its floats and those of its
 /// origin and direction are rounded, so it ends somewhere within some ε of them. A ray that ends on the triangle may
 /// hit it.
-fn is_apart([a, b, c]: &[DVec3; 3], target: Vec3, spread: &DVec3) -> bool {
+fn is_apart(corners: &[DVec3; 3], target: Vec3, spread: &DVec3) -> bool {
     const EPSILON: f64 = 0.5 * f32::EPSILON as f64;
-    let (ab, ac, at) = (*b - *a, *c - *a, target.as_dvec3() - *a);
+    // From the corner opposite the longest edge: the two others of a needle are parallel but for what they have lost.
+    let opposite = |i: usize| corners[(i + 1) % 3].distance(corners[(i + 2) % 3]);
+    let tip = (0..3).max_by(|&i, &k| opposite(i).total_cmp(&opposite(k))).unwrap_or(0);
+    let [a, b, c] = [0, 1, 2].map(|i| corners[(tip + i) % 3]);
+    let (ab, ac) = (b - a, c - a);
+    let ways = corners.map(|corner| target.as_dvec3() - corner);
+    let at = ways.into_iter().min_by(|p, q| p.length().total_cmp(&q.length())).unwrap_or(ways[0]);
     let normal = ab.cross(ac);
     let products = ab.abs().yzx() * ac.abs().zxy() + ab.abs().zxy() * ac.abs().yzx();
     let rounded = 8.0 * EPSILON * normal.abs().dot(*spread);
@@ -108,21 +116,28 @@ pub fn own_hits(trial: &Trial<'_>, leave: Leave) -> Vec<Check> {
             break;
         }
         trial.tell(SELF.id, what.clone(), number as f64 / sets.len() as f64);
-        let counted: Vec<(u64, Vec<u64>)> = (0..triangles)
+        let counted: Vec<(u64, u64, Vec<u64>)> = (0..triangles)
             .into_par_iter()
             .map(|number| one_triangle(&mut Rng::numbered(trial.seed, number), *place, rays, leave))
             .collect();
-        let tried = counted.iter().map(|(rays, _)| rays).sum();
+        let tried = counted.iter().map(|(rays, ..)| rays).sum();
+        let left_out: u64 = counted.iter().map(|(_, left_out, _)| left_out).sum();
         for (i, isa) in crate::bvh::Isa::available().into_iter().enumerate() {
-            let hits = counted.iter().filter_map(|(_, hits)| hits.get(i)).sum();
+            let hits = counted.iter().filter_map(|(.., hits)| hits.get(i)).sum();
             checks.push(Check::none(format!("{what}, {}", isa.name()), tried, "rays", hits));
         }
+        let share = left_out as f64 / (tried + left_out).max(1) as f64;
+        let what = format!("left out as they end on it, as far as floats can tell, {what}");
+        checks.push(Check::new(what, tried + left_out, "rays", share, MOST_LEFT_OUT));
     }
     checks
 }
 
-/// Rays, and those that hit the triangle that they come from, with each set of instructions.
-fn one_triangle(rng: &mut Rng, place: Option<Place>, count: usize, leave: Leave) -> (u64, Vec<u64>) {
+/// Of all rays; more would be a case that tries nothing.
+const MOST_LEFT_OUT: f64 = 0.1;
+
+/// Rays, how many were left out, and those that hit the triangle that they come from, with each set of instructions.
+fn one_triangle(rng: &mut Rng, place: Option<Place>, count: usize, leave: Leave) -> (u64, u64, Vec<u64>) {
     let alone = std::iter::repeat_with(|| {
         let corners = [(); 3].map(|()| Vec3::ZERO.map(|_| rng.decades(-8.0, 8.0)));
         let corners = corners.map(|p| place.map_or(p, |place| place.point(p)));
@@ -130,13 +145,13 @@ fn one_triangle(rng: &mut Rng, place: Option<Place>, count: usize, leave: Leave)
         let triangles: Triangles = with_surface([corners].into_iter());
         (!triangles.is_empty()).then(|| Alone::new(mesh(&triangles), placement)).flatten()
     });
-    let Some(alone) = alone.flatten().next() else { return (0, Vec::new()) };
-    let rays = rays_off(&alone, rng, count, leave);
+    let Some(alone) = alone.flatten().next() else { return (0, 0, Vec::new()) };
+    let (rays, left_out) = rays_off(&alone, rng, count, leave);
     let hits = |(_, tracer): (&str, crate::bvh::Tlas)| {
         let answers = ask(&tracer, &rays);
         answers.wrong(&vec![None; rays.len()])
     };
-    (rays.len() as u64, alone.tracers().into_iter().map(hits).collect())
+    (rays.len() as u64, left_out, alone.tracers().into_iter().map(hits).collect())
 }
 
 /// Turned, scaled by 10⁻⁴ to 10⁴ along each axis, moved by as much.

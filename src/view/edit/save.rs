@@ -2,7 +2,7 @@
 
 use super::super::controls::Notice;
 use super::super::flags::{absolute, look_flags, shell_line};
-use super::Editor;
+use super::{Editor, Selection};
 use crate::load::SceneSource;
 use crate::load::settings::edit::{EditTable, LightEdit, MaterialEdit, rows_of};
 use crate::open::SceneOrigin;
@@ -33,17 +33,28 @@ pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
     }));
     tables.extend(editor.waiting.iter().cloned());
     for &(entity, slot) in &editor.edited {
+        // What is as it was stays whatever the scene's files will say of it.
+        let mut past = editor.undo.iter().filter(|undo| undo.original.is_none());
+        let before = past.clone().find(|undo| undo.selection.entity == entity);
+        let of_slot = past.find(|undo| undo.selection == Selection { entity, slot });
         let material = super::property::material_of(world, entity, slot);
-        let material = material.and_then(|m| world.get::<Material>(m)).map(MaterialEdit::of);
+        let material = material.and_then(|m| world.get::<Material>(m)).filter(|&material| {
+            of_slot.and_then(|undo| undo.material.as_ref()).is_none_or(|(_, before)| before != material)
+        });
+        let transform = world.get::<Transform>(entity);
+        let transform = transform.filter(|&now| before.and_then(|undo| undo.transform) != Some(*now));
+        let light = world.get::<Light>(entity);
+        let light = light.filter(|&now| before.and_then(|undo| undo.light.as_ref()) != Some(now));
+        let hidden = world.get::<Hidden>(entity).is_some();
         tables.push(EditTable {
             entity: paths.of(entity),
             origin: None,
             copy_of: None,
-            matrix: world.get::<Transform>(entity).map(rows_of),
-            hidden: Some(world.get::<Hidden>(entity).is_some()),
-            light: world.get::<Light>(entity).map(LightEdit::of),
+            matrix: transform.map(rows_of),
+            hidden: before.is_none_or(|undo| undo.hidden != hidden).then_some(hidden),
+            light: light.map(LightEdit::of),
             slot: material.is_some().then_some(slot),
-            material,
+            material: material.map(MaterialEdit::of),
         });
     }
     tables

@@ -91,6 +91,48 @@ fn a_saved_scene_is_the_edited_one_to_the_bit() {
     }
 }
 
+/// Of a scene without light the program gives it one, and a camera: by what its file says, not by what was edited.
+#[test]
+fn what_was_decided_stays_when_things_are_edited() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/sphere.obj");
+    let mut app = editable(scene);
+    // Its key light, and then the ball: far away, and shining.
+    press(&mut app, Tap::NextThing, [0.5; 2]);
+    assert!(status(&app).name.contains("light"), "{:?}", status(&app));
+    press(&mut app, Tap::More, [0.5; 2]);
+    press(&mut app, Tap::NextThing, [0.5; 2]);
+    for row in 0..status(&app).rows.len() {
+        for _ in 0..if row == 0 { 20 } else { 1 } {
+            press(&mut app, Tap::More, [0.5; 2]);
+        }
+        press(&mut app, Tap::NextRow, [0.5; 2]);
+    }
+    let editor = app.world.resource::<Editor>().clone();
+    let (text, _) = save::text(&app.world, &editor).unwrap();
+    let file = std::env::temp_dir().join(format!("penumbra-sphere-{}.toml", std::process::id()));
+    std::fs::write(&file, &text).unwrap();
+    let mut again = opened(scene, Some(file.clone()));
+    std::fs::remove_file(&file).unwrap();
+    let ours = Identity::of(&app.world, scene.into());
+    assert_eq!(ours.differences(&Identity::of(&again.world, scene.into())), Vec::<String>::new(), "{text}");
+    assert_eq!(picture(&mut app), picture(&mut again));
+}
+
+#[test]
+fn only_what_was_changed_is_written() {
+    let mut app = editable("cornell");
+    choose(&mut app, PLACES[0]);
+    press(&mut app, Tap::More, PLACES[0]);
+    let tables = |app: &App| save::tables(&app.world, app.world.resource::<Editor>());
+    let moved = tables(&app).pop().unwrap();
+    assert!(moved.matrix.is_some(), "{moved:?}");
+    assert_eq!((moved.material, moved.light, moved.hidden, moved.slot), (None, None, None, None));
+    press(&mut app, Tap::Less, PLACES[0]);
+    press(&mut app, Tap::Hide, PLACES[0]);
+    let hidden = tables(&app).pop().unwrap();
+    assert_eq!((hidden.matrix, hidden.hidden), (None, Some(true)));
+}
+
 #[test]
 fn undo_brings_everything_back_to_the_bit() {
     let mut app = editable("cornell");

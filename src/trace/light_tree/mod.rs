@@ -7,9 +7,13 @@
 //! Reference: A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proc. ACM
 //! Computer Graphics and Interactive Techniques 1(2), 2018.
 
+mod node;
+
 use super::emitter::{Emitter, Receiver};
 use crate::bvh::Aabb;
 use glam::Vec3;
+use node::{Node, Prospect};
+use std::f32::consts::PI;
 
 /// One that was chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,78 +26,22 @@ pub struct Chosen {
     pub rest: f32,
 }
 
-/// What the way down needs of emitters together.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Node {
-    /// Of the ball around their box.
-    center: Vec3,
-    radius2: f32,
-    axis: Vec3,
-    cos_spread: f32,
-    sin_spread: f32,
-    intensity: f32,
-    /// First of two children, or, in a leaf, which emitter.
-    child: u32,
-    is_leaf: bool,
-}
-
-impl Node {
-    fn new(all: &Emitter, child: usize, is_leaf: bool) -> Self {
-        let half = (all.bounds.max - all.bounds.min) * 0.5;
-        let (sin_spread, cos_spread) = all.spread.sin_cos();
-        Self {
-            center: all.bounds.center(),
-            radius2: half.length_squared(),
-            axis: all.axis,
-            cos_spread,
-            sin_spread,
-            intensity: all.intensity,
-            child: child as u32,
-            is_leaf,
-        }
-    }
-
-    /// What they could bring to a point if nothing is in between; bounds of angles, but the distance of their middle.
-    fn importance(&self, to: &Receiver) -> f32 {
-        let along = self.center - to.point;
-        let distance2 = along.length_squared();
-        // From inside of the ball around them, they may be anywhere.
-        let (mut leaves, mut arrives) = (1.0, 1.0);
-        if distance2 > self.radius2 {
-            let toward = along / distance2.sqrt();
-            let sin2 = self.radius2 / distance2;
-            let size = [sin2.sqrt(), (1.0 - sin2).sqrt()];
-            let beyond = without(angle(-self.axis.dot(toward)), [self.sin_spread, self.cos_spread]);
-            leaves = without(beyond, size)[1];
-            arrives = without(angle(to.normal.dot(toward)), size)[1];
-        }
-        // Never quite dark: what shines through a surface arrives from behind, and rounding must not decide.
-        self.intensity * leaves.max(0.01) * arrives.max(0.05)
-            / distance2.max(self.radius2).max(f32::MIN_POSITIVE)
-    }
-}
-
-/// Sine and cosine of an angle up to π, of its cosine.
-fn angle(cos: f32) -> [f32; 2] {
-    let cos = cos.clamp(-1.0, 1.0);
-    [(1.0 - cos * cos).sqrt(), cos]
-}
-
-/// Of the first angle without the second; of 0 if it is the smaller one.
-fn without([sin_a, cos_a]: [f32; 2], [sin_b, cos_b]: [f32; 2]) -> [f32; 2] {
-    if cos_a >= cos_b {
-        return [0.0, 1.0];
-    }
-    [sin_a * cos_b - cos_a * sin_b, cos_a * cos_b + sin_a * sin_b]
-}
-
 /// A hierarchy over emitters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightTree {
     nodes: Vec<Node>,
-    /// The way to each emitter from the root: a bit for each node, the first lowest.
-    ways: Vec<u64>,
+    /// The way to each emitter from the root: a bit for each node, the first lowest; and its place in `order`.
+    ways: Vec<(u64, u32)>,
+    /// Emitters as leaves have them, from first to last.
+    order: Vec<u32>,
+    /// Sums of the intensities of those before each place, and of all.
+    sums: Vec<f64>,
 }
+
+/// Cones up to this, in radians, are alike.
+const ALIKE: f32 = 0.5;
+/// The least chance of a child that could bring anything: below it random numbers have gaps.
+const LEAST: f32 = 1.0 / 4096.0;
 
 /// Planes that are tried along each axis.
 const BINS: usize = 12;
@@ -106,13 +54,22 @@ impl LightTree {
     /// Over these; those that bring nothing are chosen with those beside them, if ever.
     #[must_use]
     pub fn new(emitters: &[Emitter]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), ways: vec![0; emitters.len()] };
-        if !emitters.is_empty() {
-            let mut order: Vec<u32> = (0..emitters.len() as u32).collect();
-            tree.nodes.reserve(2 * emitters.len());
-            tree.nodes.push(Node::default());
-            tree.build(0, emitters, &mut order, 0, 0);
+        let mut tree = Self { ways: vec![(0, 0); emitters.len()], ..Self::default() };
+        if emitters.is_empty() {
+            return tree;
         }
+        let mut order: Vec<u32> = (0..emitters.len() as u32).collect();
+        tree.nodes.reserve(2 * emitters.len());
+        tree.nodes.push(Node::default());
+        tree.build(0, emitters, &mut order, [0, 0], 0);
+        let mut sum = 0.0;
+        tree.sums.push(sum);
+        for (place, &emitter) in (0..).zip(&order) {
+            sum += f64::from(emitters[emitter as usize].intensity);
+            tree.sums.push(sum);
+            tree.ways[emitter as usize].1 = place;
+        }
+        tree.order = order;
         tree
     }
 
@@ -122,66 +79,103 @@ impl LightTree {
         self.nodes.is_empty()
     }
 
-    /// Fills `node` with those of `order`, and returns them together.
+    /// Fills `node` with those of `order`, of which the first has this place among all, and returns them together, and whether
+    /// they are alike.
     fn build(
         &mut self,
         node: usize,
         emitters: &[Emitter],
         order: &mut [u32],
-        depth: u32,
+        [place, depth]: [usize; 2],
         way: u64,
-    ) -> Emitter {
+    ) -> (Emitter, bool) {
+        let places = place..place + order.len();
         if let [only] = *order {
-            let only = only as usize;
-            self.nodes[node] = Node::new(&emitters[only], only, true);
-            self.ways[only] = way;
-            return emitters[only];
+            let emitter = emitters[only as usize];
+            self.nodes[node] = Node::new(&emitter, false, 0, places);
+            self.ways[only as usize].0 = way;
+            return (emitter, true);
         }
-        let middle = split(emitters, order, depth);
+        let middle = split(emitters, order, depth as u32);
         let child = self.nodes.len();
         self.nodes.extend([Node::default(); 2]);
         let (left, right) = order.split_at_mut(middle);
-        let first = self.build(child, emitters, left, depth + 1, way);
-        let all = first.union(&self.build(child + 1, emitters, right, depth + 1, way | 1 << depth));
-        self.nodes[node] = Node::new(&all, child, false);
-        all
+        let (first, first_alike) = self.build(child, emitters, left, [place, depth + 1], way);
+        let way = way | 1 << depth;
+        let (second, second_alike) = self.build(child + 1, emitters, right, [place + middle, depth + 1], way);
+        let all = first.union(&second);
+        // Those of no common direction only if each of them shines to all sides.
+        let is_one_way = |emitter: &Emitter| emitter.spread <= ALIKE;
+        let is_every_way = |emitter: &Emitter| emitter.spread >= PI;
+        let same = is_one_way(&all) || is_every_way(&first) && is_every_way(&second);
+        let alike = first_alike && second_alike && same;
+        self.nodes[node] = Node::new(&all, alike, child, places);
+        (all, alike)
     }
 
-    /// Probability of the first child.
-    fn share(&self, node: &Node, to: &Receiver) -> f32 {
-        let [a, b] = [0, 1].map(|i| self.nodes[node.child as usize + i].importance(to));
+    /// Both children, and the probability of the first.
+    #[inline(always)]
+    fn branch(&self, node: &Node, to: &Receiver) -> ([&Node; 2], [Prospect; 2], f32) {
+        let child = node.child as usize;
+        let (first, second) = (&self.nodes[child], &self.nodes[child + 1]);
+        let (a, b) = (first.from(to), second.from(to));
         // Scaled: of huge ones the sum would overflow.
-        let share = 1.0 / (1.0 + b / a);
-        if share.is_nan() { 0.5 } else { share }
+        let share = 1.0 / (1.0 + b.importance / a.importance);
+        let share = match share {
+            _ if share.is_nan() => 0.5,
+            _ if a.importance > 0.0 && b.importance > 0.0 => share.clamp(LEAST, 1.0 - LEAST),
+            _ => share,
+        };
+        ([first, second], [a, b], share)
     }
 
     /// Chooses one by a number in [0, 1); `None` if there is none.
     #[must_use]
     pub fn sample(&self, to: &Receiver, random: f32) -> Option<Chosen> {
         let mut node = self.nodes.first()?;
+        let mut is_far = node.from(to).is_far;
         let (mut chance, mut rest) = (1.0, random);
-        while !node.is_leaf {
-            let share = self.share(node, to);
+        while node.count > 1 && !is_far {
+            let (children, prospects, share) = self.branch(node, to);
             let second = rest >= share;
             let (here, below) = if second { (1.0 - share, share) } else { (share, 0.0) };
             chance *= here;
             rest = ((rest - below) / here).clamp(0.0, 1.0 - f32::EPSILON);
-            node = &self.nodes[node.child as usize + usize::from(second)];
+            (node, is_far) = (children[usize::from(second)], prospects[usize::from(second)].is_far);
         }
-        (chance > 0.0).then_some(Chosen { emitter: node.child as usize, chance, rest })
+        let mut place = node.first as usize;
+        if node.count > 1 {
+            let sums = &self.sums[place..=place + node.count as usize];
+            let all = sums[node.count as usize] - sums[0];
+            let wanted = sums[0] + f64::from(rest) * all;
+            let i = sums[1..node.count as usize].partition_point(|&sum| sum <= wanted);
+            let own = sums[i + 1] - sums[i];
+            place += i;
+            chance *= (own / all) as f32;
+            rest = (((wanted - sums[i]) / own) as f32).clamp(0.0, 1.0 - f32::EPSILON);
+        }
+        (chance > 0.0).then_some(Chosen { emitter: self.order[place] as usize, chance, rest })
     }
 
     /// The [`Chosen::chance`] of an emitter.
     #[must_use]
     pub fn chance(&self, to: &Receiver, emitter: usize) -> f32 {
-        let (Some(&way), Some(mut node)) = (self.ways.get(emitter), self.nodes.first()) else { return 0.0 };
+        let (Some(&(way, place)), Some(mut node)) = (self.ways.get(emitter), self.nodes.first()) else {
+            return 0.0;
+        };
+        let mut is_far = node.from(to).is_far;
         let (mut way, mut chance) = (way, 1.0);
-        while !node.is_leaf {
-            let share = self.share(node, to);
+        while node.count > 1 && !is_far {
+            let (children, prospects, share) = self.branch(node, to);
             let second = way & 1 == 1;
             chance *= if second { 1.0 - share } else { share };
             way >>= 1;
-            node = &self.nodes[node.child as usize + usize::from(second)];
+            (node, is_far) = (children[usize::from(second)], prospects[usize::from(second)].is_far);
+        }
+        if node.count > 1 {
+            let sum = |place: u32| self.sums[place as usize];
+            let all = sum(node.first + node.count) - sum(node.first);
+            chance *= ((sum(place + 1) - sum(place)) / all) as f32;
         }
         chance
     }
