@@ -153,8 +153,8 @@ impl Accumulator for Running {
 
 #[test]
 fn sums_in_single_precision_are_found() {
-    let checks = adding::<Single>(1 << 26, 0);
-    for word in ["0.1", "ones", "numbers in"] {
+    let checks = adding::<Single>(&trial(), 1 << 26);
+    for word in ["0.1", "ones", "numbers in", "halves of", "variance of", "variance beside"] {
         finds(word, &checks);
     }
     let checks = a_day::<Single>(1 << 24, 0);
@@ -197,7 +197,7 @@ fn a_scene_that_makes_no_numbers_is_found() {
 
 #[test]
 fn a_variance_of_rounded_sums_is_found() {
-    // f32 of 1e4 has steps of a thousandth; squares of sums would be off by far more.
+    // f32 of 1e4 has steps of a thousandth; here they are of an eighth.
     #[derive(Clone, Default)]
     struct Coarse(Single);
     impl Accumulator for Coarse {
@@ -217,7 +217,10 @@ fn a_variance_of_rounded_sums_is_found() {
             self.0.count()
         }
     }
-    finds("variance", &adding::<Coarse>(1000, 0));
+    let checks = adding::<Coarse>(&trial(), 1000);
+    finds("halves of", &checks);
+    finds("variance of", &checks);
+    finds("variance beside", &checks);
 }
 
 /// A pixel that ends when its own halves agree is biased, most where it is dark.
