@@ -98,6 +98,9 @@ pub fn judge_meridian(what: &str, shade: &[f64]) -> Vec<Check> {
 fn terminator(trial: &Trial<'_>) -> Vec<Check> {
     let mut checks = Vec::new();
     for place in places(trial.effort) {
+        if trial.interrupted() {
+            return checks;
+        }
         for (name, mesh) in [("80 facets", icosphere()), ("168 facets", ball(8))] {
             for integrator in [Integrator::Direct, Integrator::Path] {
                 let shade = meridian(smooth(mesh.clone()), integrator, place);
