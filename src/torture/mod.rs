@@ -155,6 +155,22 @@ pub fn shows() -> Vec<Made> {
     geometry::SHOWS.to_vec()
 }
 
+/// Why there is no scene of that case, or none of how it looks when it breaks; and what there is.
+#[must_use]
+pub fn why_not_shown(id: &str, open: bool) -> String {
+    let all: Vec<&str> = shows().iter().map(|made| made.name.trim_start_matches("torture:")).collect();
+    let why = if open && shown(&format!("torture:{id}")).is_some() {
+        "nobody made a broken one of it"
+    } else if cases().iter().all(|case| !case.id.eq_ignore_ascii_case(id)) {
+        "there is no such case"
+    } else if id.starts_with(['S', 's']) {
+        "it tries numbers, which have no picture"
+    } else {
+        "it measures single points of light and shade, not a picture"
+    };
+    format!("--show {id}: {why}; there are {}", all.join(", "))
+}
+
 /// Runs `case`.
 #[must_use]
 pub fn run(case: &Case, trial: &Trial<'_>) -> Tried {

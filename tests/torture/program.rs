@@ -35,7 +35,9 @@ fn a_scene_is_shown_or_a_table_printed() {
     let (code, _, error) = torture(&["--show", "G1", "--json"]);
     assert!(code == Some(2) && error.contains("--json"), "{error}");
     let (code, _, error) = torture(&["--show", "S5"]);
-    assert!(code == Some(2) && error.contains("torture:G1"), "{error}");
+    assert!(code == Some(2) && error.contains("numbers") && error.contains(" G1, "), "{error}");
+    let (code, _, error) = torture(&["--show", "G3", "--open-edge"]);
+    assert!(code == Some(2) && error.contains("broken"), "{error}");
 }
 
 #[cfg(unix)]

@@ -73,9 +73,7 @@ pub fn run(args: &TortureArgs) -> u8 {
 fn show(id: &str, open: bool) -> u8 {
     let name = format!("torture:{id}{}", if open { "-open" } else { "" });
     if torture::shown(&name).is_none() {
-        let names: Vec<&str> = torture::shows().iter().map(|made| made.name).collect();
-        let error = format!("--show {id}: there is no {name} to look at; there are {}", names.join(", "));
-        return exit::because(&error, exit::BAD_COMMAND_LINE);
+        return exit::because(&torture::why_not_shown(id, open), exit::BAD_COMMAND_LINE);
     }
     match Cli::try_parse_from(["penumbra", &name]) {
         Ok(cli) => window::run(&cli.window),
