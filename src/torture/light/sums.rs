@@ -87,11 +87,11 @@ fn added<A: Accumulator>(trial: &Trial<'_>, count: u32, mut sample: impl FnMut(u
 }
 
 /// 10,000 ± 0.01, whose variance single precision has below 0. A pixel keeps sums of its even and of its odd samples,
-/// and the spread of many pixels' halves is the variance over the samples of a half. So each of 256 pixels gets `count` / 256
+/// and the spread of many pixels' halves is the variance over the samples of a half. So each of 4,096 pixels gets `count` / 4,096
 /// samples, and one of them all; every half is compared with sums of whole numbers, of which samples are multiples
 /// (2⁻¹⁰: one step of floats there), and the variance with the one that these have.
 fn spread<A: Accumulator>(trial: &Trial<'_>, count: u32) -> Vec<Check> {
-    const PIXELS: u32 = 256;
+    const PIXELS: u32 = 4096;
     const STEP: f64 = 1.0 / 1024.0;
     let mut rng = Rng(trial.seed);
     let mut samples = |pixel: &mut A, count: u32| {
@@ -133,7 +133,7 @@ fn spread<A: Accumulator>(trial: &Trial<'_>, count: u32) -> Vec<Check> {
     // Differences of a hundred thousandth of 1e4 lose 8 of 16 digits.
     let off = (variance(found) / variance(exact) - 1.0).abs();
     checks.push(Check::new("variance of 1e4 ± 0.01: relative error", u64::from(count), "samples", off, 1e-6));
-    // 1e-4 and what the step of floats adds, a twelfth of its square; 256 differences know it to a tenth or so.
+    // 1e-4 and what the step of floats adds, a twelfth of its square; 4,096 differences know it to a tenth at 4.5 standard errors.
     let sure = 4.5 * (2.0 / f64::from(PIXELS)).sqrt();
     let expected = 1e-4 + STEP * STEP / 12.0;
     let off = (variance(found) / expected - 1.0).abs();
