@@ -13,9 +13,9 @@ use std::sync::Arc;
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 
-/// G7: a knot in a room at 1e7. Open: seen from the world's origin, as who keeps its coordinates sees it.
+/// G7: a knot in a room at 1e6. Open: seen from the world's origin, as who keeps its coordinates sees it.
 pub(super) fn far(world: &mut World, open: bool) -> Vec<String> {
-    const AT: DVec3 = DVec3::splat(1e7);
+    const AT: DVec3 = DVec3::splat(1e6);
     if open {
         world.insert_resource(RenderOrigin(Some(DVec3::ZERO)));
     }
@@ -29,8 +29,8 @@ pub(super) fn far(world: &mut World, open: bool) -> Vec<String> {
     let camera = world.spawn((Camera { projection: super::WIDE }, place)).id();
     world.insert_resource(ActiveCamera(camera));
     vec![format!(
-        "a knot in a room at 1e7{}",
-        if open { ", where floats are whole numbers" } else { ": as at the origin" }
+        "a knot in a room at 1e6{}",
+        if open { ", where floats have steps of a sixteenth" } else { ": as at the origin" }
     )]
 }
 
