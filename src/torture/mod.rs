@@ -43,6 +43,7 @@ pub struct Check {
     /// What they are.
     pub unit: &'static str,
     /// What came out: smaller is better.
+    #[serde(serialize_with = "table::as_it_is")]
     pub ours: f64,
     /// The most that is right.
     pub limit: f64,
@@ -72,7 +73,7 @@ impl Check {
 }
 
 /// What a case came to.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Tried {
     /// Which case.
     pub id: &'static str,
@@ -84,19 +85,36 @@ pub struct Tried {
     pub checks: Vec<Check>,
     /// How long it took.
     pub seconds: f64,
+    /// Whether nobody interrupted it.
+    pub complete: bool,
 }
 
 impl Tried {
-    /// Whether all limits are kept.
+    /// Whether all limits are kept. What was cut short shows nothing.
     #[must_use]
     pub fn holds(&self) -> bool {
-        !self.checks.is_empty() && self.checks.iter().all(Check::holds)
+        self.complete && !self.checks.is_empty() && self.checks.iter().all(Check::holds)
     }
 
     /// Whether all limits are kept but those whose breach is stated.
     #[must_use]
     pub fn holds_but_for_what_is_stated(&self) -> bool {
-        !self.checks.is_empty() && self.checks.iter().all(|check| check.holds() || check.excuse.is_some())
+        let fine = |check: &Check| check.holds() || check.excuse.is_some();
+        self.complete && !self.checks.is_empty() && self.checks.iter().all(fine)
+    }
+
+    /// In a word or two. Of what was cut short not even a breach is sure: some sums were not complete.
+    #[must_use]
+    pub fn verdict(&self) -> &'static str {
+        if !self.complete {
+            "cut short"
+        } else if self.holds() {
+            "holds"
+        } else if self.holds_but_for_what_is_stated() {
+            "stated"
+        } else {
+            "BROKEN"
+        }
     }
 
     /// The check that is furthest from keeping its limit; before those with an excuse one that has none.
@@ -137,6 +155,22 @@ pub fn shows() -> Vec<Made> {
     geometry::SHOWS.to_vec()
 }
 
+/// Why there is no scene of that case, or none of how it looks when it breaks; and what there is.
+#[must_use]
+pub fn why_not_shown(id: &str, open: bool) -> String {
+    let all: Vec<&str> = shows().iter().map(|made| made.name.trim_start_matches("torture:")).collect();
+    let why = if open && shown(&format!("torture:{id}")).is_some() {
+        "nobody made a broken one of it"
+    } else if cases().iter().all(|case| !case.id.eq_ignore_ascii_case(id)) {
+        "there is no such case"
+    } else if id.starts_with(['S', 's']) {
+        "it tries numbers, which have no picture"
+    } else {
+        "it measures single points of light and shade, not a picture"
+    };
+    format!("--show {id}: {why}; there are {}", all.join(", "))
+}
+
 /// Runs `case`.
 #[must_use]
 pub fn run(case: &Case, trial: &Trial<'_>) -> Tried {
@@ -148,6 +182,7 @@ pub fn run(case: &Case, trial: &Trial<'_>) -> Tried {
         limit: case.limit,
         checks,
         seconds: start.elapsed().as_secs_f64(),
+        complete: !trial.interrupted(),
     }
 }
 
@@ -156,7 +191,7 @@ mod tests {
     use super::*;
 
     fn tried(checks: Vec<Check>) -> Tried {
-        Tried { id: "X1", title: "", limit: "", checks, seconds: 0.0 }
+        Tried { id: "X1", title: "", limit: "", checks, seconds: 0.0, complete: true }
     }
 
     #[test]
@@ -174,6 +209,19 @@ mod tests {
         let both = tried(vec![Check::none("", 10, "rays", 0), broken]);
         assert!(!both.holds() && both.holds_but_for_what_is_stated());
         assert_eq!(both.worst().map(|check| check.ours), Some(1.0));
+    }
+
+    #[test]
+    fn what_was_cut_short_has_no_verdict() {
+        let whole = tried(vec![Check::none("", 10, "rays", 0)]);
+        assert_eq!(whole.verdict(), "holds");
+        let part = Tried { complete: false, ..whole };
+        assert!(!part.holds() && !part.holds_but_for_what_is_stated());
+        assert_eq!(part.verdict(), "cut short");
+        let interrupt = std::sync::atomic::AtomicBool::new(true);
+        let trial = Trial { effort: Effort::Quick, seed: 1, progress: &|_| {}, interrupt: &interrupt };
+        let case = Case { id: "X1", title: "", limit: "", run: |_| vec![Check::none("", 10, "rays", 0)] };
+        assert!(!run(&case, &trial).complete);
     }
 
     #[test]

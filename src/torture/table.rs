@@ -1,7 +1,7 @@
 //! The pass table, for people and for programs.
 
 use super::{Check, Tried};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::fmt::Write;
 
 /// A line of the table: case, title, what was tried, ours, the limit, verdict.
@@ -11,13 +11,6 @@ pub fn rows(all: &[Tried]) -> Vec<[String; 6]> {
 }
 
 fn row(tried: &Tried) -> [String; 6] {
-    let verdict = if tried.holds() {
-        "holds"
-    } else if tried.holds_but_for_what_is_stated() {
-        "stated"
-    } else {
-        "BROKEN"
-    };
     let worst = tried.worst();
     [
         tried.id.to_owned(),
@@ -25,7 +18,7 @@ fn row(tried: &Tried) -> [String; 6] {
         count(&tried.checks),
         worst.map_or("—".to_owned(), |check| format!("{} {}", number(check.ours), check.what)),
         tried.limit.to_owned(),
-        verdict.to_owned(),
+        tried.verdict().to_owned(),
     ]
 }
 
@@ -57,7 +50,12 @@ pub fn markdown(all: &[Tried]) -> String {
     text
 }
 
-/// With every check.
+/// A number; what is none by its name, which JSON has no number for.
+pub(super) fn as_it_is<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    if x.is_finite() { serializer.serialize_f64(*x) } else { serializer.serialize_str(&x.to_string()) }
+}
+
+/// With every check, and whether it holds.
 ///
 /// # Errors
 /// Never in practice: all numbers and names can be written.
@@ -65,7 +63,55 @@ pub fn json(all: &[Tried]) -> serde_json::Result<String> {
     #[derive(Serialize)]
     struct Table<'a> {
         version: &'static str,
-        cases: &'a [Tried],
+        cases: Vec<One<'a>>,
     }
-    serde_json::to_string_pretty(&Table { version: env!("CARGO_PKG_VERSION"), cases: all })
+    #[derive(Serialize)]
+    struct One<'a> {
+        id: &'static str,
+        title: &'static str,
+        limit: &'static str,
+        verdict: &'static str,
+        complete: bool,
+        seconds: f64,
+        checks: Vec<Judged<'a>>,
+    }
+    #[derive(Serialize)]
+    struct Judged<'a> {
+        holds: bool,
+        #[serde(flatten)]
+        check: &'a Check,
+    }
+    fn judged(check: &Check) -> Judged<'_> {
+        Judged { holds: check.holds(), check }
+    }
+    fn one(tried: &Tried) -> One<'_> {
+        let Tried { id, title, limit, ref checks, seconds, complete } = *tried;
+        let checks = checks.iter().map(judged).collect();
+        One { id, title, limit, verdict: tried.verdict(), complete, seconds, checks }
+    }
+    let cases = all.iter().map(one).collect();
+    serde_json::to_string_pretty(&Table { version: env!("CARGO_PKG_VERSION"), cases })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_read_verdicts() {
+        let check = |ours: f64| Check::new("x", 10, "rays", ours, 1.0);
+        let tried = |checks| Tried { id: "X1", title: "t", limit: "l", checks, seconds: 0.5, complete: true };
+        let cut = Tried { complete: false, ..tried(vec![check(0.5)]) };
+        let all = [tried(vec![check(0.5), check(f64::NAN), check(f64::INFINITY)]), cut];
+        let read: serde_json::Value = serde_json::from_str(&json(&all).unwrap()).unwrap();
+        let [first, second] = [0, 1].map(|i| &read["cases"][i]);
+        assert_eq!((&first["verdict"], &first["complete"]), (&"BROKEN".into(), &true.into()));
+        assert_eq!((&second["verdict"], &second["complete"]), (&"cut short".into(), &false.into()));
+        let checks = &first["checks"];
+        assert_eq!((&checks[0]["holds"], &checks[0]["ours"]), (&true.into(), &0.5.into()));
+        assert_eq!((&checks[1]["holds"], &checks[1]["ours"]), (&false.into(), &"NaN".into()));
+        assert_eq!(checks[2]["ours"], "inf");
+        assert_eq!(rows(&all)[1][5], "cut short");
+        assert!(markdown(&all).lines().last().unwrap().ends_with("| cut short |"));
+    }
 }

@@ -1,5 +1,6 @@
 //! The torture chamber's cases hold, and every checker finds who does it wrong.
 
 mod geometry;
+mod program;
 mod scenes;
 mod show;

@@ -4,7 +4,9 @@ use crate::geometry::{finds, quick, sabotaged};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use penumbra::bvh::wide::{WIDTH, WideNode};
 use penumbra::bvh::{Blas, Hit, Isa, Ray, WideBvh};
-use penumbra::scene::{Material, Transform, TriangleMesh};
+use penumbra::scene::{Light, Material, Transform, TriangleMesh};
+use penumbra::torture::geometry::degenerate::Degenerate;
+use penumbra::torture::geometry::stage::{Stage, WIDE};
 use penumbra::torture::geometry::{camera, counts, degenerate, exact, leave, ties, worst};
 use penumbra::torture::{Check, Place};
 use std::collections::HashMap;
@@ -14,7 +16,36 @@ fn a_pixel_that_is_no_number_is_found() {
     let mut scenes = degenerate::scenes();
     scenes.truncate(1);
     scenes[0].material = Material::emissive(Vec3::NAN);
-    finds(&quick(|trial| degenerate::pictures(trial, &scenes)), "an index twice");
+    finds(
+        &quick(|trial| degenerate::pictures(trial, &scenes, degenerate::picture)),
+        "an index twice, origin",
+    );
+}
+
+#[test]
+fn things_that_are_not_drawn_are_found() {
+    let nothing = |scene: &Degenerate, place: Place, isa: Isa, samples: u32| {
+        let (mesh, material) = (TriangleMesh::default(), Material::default());
+        degenerate::picture(
+            &Degenerate { mesh, material, name: scene.name, place: scene.place },
+            place,
+            isa,
+            samples,
+        )
+    };
+    let checks = quick(|trial| degenerate::pictures(trial, &degenerate::scenes(), nothing));
+    for what in ["an index twice", "positions of 1e30", "24 orders", "flattened", "scaled by 1e-6"] {
+        finds(&checks, &format!("Thing seen: {what}"));
+    }
+    // Of no area there is nothing to see.
+    assert!(!checks.iter().any(|check| check.what.contains("Thing seen: no area")));
+    let blind = |_: &Degenerate, place: Place, isa: Isa, samples: u32| {
+        let mut stage = Stage::new(32, 24, place.transform()).with_isa(isa);
+        stage.add(Light::Environment { radiance: Vec3::ONE }, DAffine3::IDENTITY);
+        stage.look(DVec3::Z, DVec3::ZERO, DVec3::Y, WIDE);
+        stage.picture(samples)
+    };
+    finds(&quick(|trial| degenerate::pictures(trial, &degenerate::scenes(), blind)), "Ball seen: slivers");
 }
 
 /// Of a triangle by its corners; one that is smaller than a fixed epsilon has none of its own.
@@ -59,6 +90,19 @@ fn builds_that_compare_all_of_one_centroid_are_found() {
         (Blas::build(triangles), equal)
     };
     finds(&quick(|trial| worst::times(trial, &worst::kinds(8000), pairs)), "random: equal");
+}
+
+/// Machines are shared: what takes too long is timed again, up to ten times.
+#[test]
+fn the_worst_triangles_are_built_in_time() {
+    let kinds = worst::kinds(20_000);
+    let in_time = |_| {
+        let checks = quick(|trial| worst::times(trial, &kinds, Blas::build));
+        let late: Vec<_> = checks.iter().filter(|check| !check.holds()).collect();
+        println!("{late:#?}");
+        late.is_empty()
+    };
+    assert!((0..10).any(in_time));
 }
 
 #[test]

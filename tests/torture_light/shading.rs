@@ -6,12 +6,13 @@ use penumbra::image::Display;
 use penumbra::scene::color::srgb_from_linear;
 use penumbra::scene::{Encoding, Filter, Texture};
 use penumbra::torture::light::meter::no_light;
-use penumbra::torture::light::shading::{
-    PAPER, as_it_is, carried, faceted_meridian, flat_normals, judge_meridian, leak,
-};
+use penumbra::torture::light::shading::{as_it_is, carried};
 use penumbra::torture::light::surfaces::{all_surfaces, is_fine, tilted_mirrors};
+use penumbra::torture::light::terminator::{
+    PAPER, contact, faceted_meridian, flat_normals, judge_meridian, leak,
+};
 use penumbra::torture::light::textures::{coordinates, decoding, tone_maps};
-use penumbra::torture::light::transport::{all_the_same, no_more_than, on_average};
+use penumbra::torture::light::transport::{all_the_same, no_more_than_one, on_average};
 use penumbra::torture::{Check, Place};
 use penumbra::trace::texture::lookup;
 
@@ -28,6 +29,12 @@ fn light_that_leaks_around_paper_is_found() {
     // Near its edges the cube's smooth surface is 0.35 further out, beyond the paper.
     finds("behind paper", &[leak(Place::ORIGIN, PAPER - 0.35)]);
     finds("flat normals", &[flat_normals(|normal| (normal + Vec3::X * 1e-4).normalize())]);
+}
+
+#[test]
+fn light_below_what_stands_on_a_floor_is_found() {
+    assert!(contact(Place::ORIGIN, 0.0).holds());
+    finds("stands on a floor", &[contact(Place::ORIGIN, 0.05)]);
 }
 
 #[test]
@@ -112,8 +119,10 @@ fn lost_and_gained_energy_is_found() {
     assert!(on_average("fair", 1, &noisy(5.0), 5.0, 0.0).iter().all(Check::holds));
     finds("standard errors off", &on_average("half a percent", 1, &noisy(4.975), 5.0, 0.0));
     finds("relative", &on_average("too noisy", 1, &[1.0, 2.0, 0.0, 1.0], 1.0, 0.0));
-    assert!(no_more_than("fair", 1, &noisy(1.0), 1.0).holds());
-    assert!(!no_more_than("gains", 1, &noisy(1.005), 1.0).holds());
+    assert!(no_more_than_one("fair", 1, &noisy(1.0), [0.01, 1e-3]).iter().all(Check::holds));
+    finds("above", &no_more_than_one("gains", 1, &noisy(1.005), [0.01, 1e-3]));
+    finds("loss", &no_more_than_one("loses", 1, &noisy(0.98), [0.01, 1e-3]));
+    finds("relative", &no_more_than_one("too noisy", 1, &[1.0, 2.0, 0.0, 1.0], [1.0, 1e-3]));
 }
 
 #[test]

@@ -13,18 +13,21 @@ use std::sync::{Arc, Mutex};
 
 /// Tries the cases asked for, and prints the table.
 pub fn run(args: &TortureArgs) -> u8 {
-    let all = torture::cases();
+    let cases = match chosen(&torture::cases(), &args.case) {
+        Ok(cases) => cases,
+        Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
+    };
     if args.list {
-        for case in &all {
+        for case in &cases {
             line(format_args!("{:<4} {}: {}", case.id, case.title, case.limit));
         }
         return 0;
     }
-    let cases = match chosen(&all, &args.case) {
-        Ok(cases) => cases,
-        Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
-    };
     if let Some(id) = &args.show {
+        if args.json || args.markdown {
+            let error = "--show opens a scene; --json and --markdown print what cases came to";
+            return exit::because(&error, exit::BAD_COMMAND_LINE);
+        }
         return show(id, args.open_edge);
     }
     set_threads(args.threads);
@@ -70,9 +73,7 @@ pub fn run(args: &TortureArgs) -> u8 {
 fn show(id: &str, open: bool) -> u8 {
     let name = format!("torture:{id}{}", if open { "-open" } else { "" });
     if torture::shown(&name).is_none() {
-        let names: Vec<&str> = torture::shows().iter().map(|made| made.name).collect();
-        let error = format!("--show {id}: there is no {name} to look at; there are {}", names.join(", "));
-        return exit::because(&error, exit::BAD_COMMAND_LINE);
+        return exit::because(&torture::why_not_shown(id, open), exit::BAD_COMMAND_LINE);
     }
     match Cli::try_parse_from(["penumbra", &name]) {
         Ok(cli) => window::run(&cli.window),
@@ -80,15 +81,20 @@ fn show(id: &str, open: bool) -> u8 {
     }
 }
 
+/// Those of these names, which commas may part, each once.
 fn chosen(all: &[Case], wanted: &[String]) -> Result<Vec<Case>, String> {
     if wanted.is_empty() {
         return Ok(all.to_vec());
     }
-    let find = |id: &String| {
-        let case = all.iter().find(|case| case.id.eq_ignore_ascii_case(id)).copied();
-        case.ok_or_else(|| format!("--case {id}: there is no such case; --list names them"))
-    };
-    wanted.iter().map(find).collect()
+    let mut cases: Vec<Case> = Vec::new();
+    for id in wanted.iter().flat_map(|list| list.split(',')).map(str::trim) {
+        let case = all.iter().find(|case| case.id.eq_ignore_ascii_case(id));
+        let case = case.ok_or_else(|| format!("--case {id}: there is no such case; --list names them"))?;
+        if cases.iter().all(|other| other.id != case.id) {
+            cases.push(*case);
+        }
+    }
+    Ok(cases)
 }
 
 fn print(tried: &[Tried], args: &TortureArgs) -> serde_json::Result<()> {
@@ -99,7 +105,7 @@ fn print(tried: &[Tried], args: &TortureArgs) -> serde_json::Result<()> {
     } else {
         for [id, title, count, ours, limit, verdict] in torture::rows(tried) {
             line(format_args!(
-                "{id:<4} {verdict:<7} {title}\n     tried {count}\n     ours  {ours}\n     limit {limit}"
+                "{id:<4} {verdict:<9} {title}\n     tried {count}\n     ours  {ours}\n     limit {limit}"
             ));
         }
     }

@@ -10,9 +10,10 @@ use std::sync::Arc;
 
 pub(super) const CASE: Case = Case {
     id: "G4",
-    title: "boxes against trying every triangle, for hierarchies built, refitted and in parts",
+    title: "boxes against trying every triangle, for hierarchies built (binned; slivers split), refitted and in parts of 1, 2, 4, 8; \
+            nodes are 8 wide, and no other builder is there",
     limit: "the same hit and t, bit for bit; every node holds its triangles",
-    run: |trial| run(trial, &ours()),
+    run: |trial| run(trial, &ours().into_iter().chain(leaves()).collect::<Vec<_>>()),
 };
 
 /// Half of the rays are aimed exactly at corners and edges.
@@ -29,15 +30,14 @@ pub fn aimed_ray(rng: &mut Rng, triangles: &[[Vec3; 3]], scale: f32, center: Vec
     Ray::new(origin, target - origin)
 }
 
-/// Eight meshes with the triangles in turn, placed where they are.
+/// Meshes with the triangles in turn, placed where they are.
 struct Parts {
     tlas: Tlas,
     firsts: Vec<u32>,
 }
 
 impl Parts {
-    fn new(triangles: &[[Vec3; 3]], isa: Isa) -> Self {
-        let size = triangles.len().div_ceil(8).max(1);
+    fn new(triangles: &[[Vec3; 3]], size: usize, isa: Isa) -> Self {
         let parts = triangles.chunks(size).map(|part| Arc::new(Blas::build(part)));
         let placements = parts.filter_map(|part| Placement::new(part, DAffine3::IDENTITY)).collect();
         let firsts = (0..triangles.len() as u32).step_by(size).collect();
@@ -87,10 +87,22 @@ pub fn ours() -> Vec<Maker<'static>> {
         [
             Maker::new(format!("built, {}", isa.name()), move |t| Blas::build(t).with_isa(isa)),
             Maker::new(format!("refitted, {}", isa.name()), move |t| refitted(t).with_isa(isa)),
-            Maker::new(format!("in parts, {}", isa.name()), move |t| Parts::new(t, isa)),
+            Maker::new(format!("in parts, {}", isa.name()), move |t| {
+                Parts::new(t, t.len().div_ceil(8).max(1), isa)
+            }),
         ]
     };
     Isa::available().into_iter().flat_map(makers).collect()
+}
+
+/// Top levels over so many triangles each: hierarchies whose leaves are of that size, each with one set of instructions.
+fn leaves() -> Vec<Maker<'static>> {
+    let isas = Isa::available();
+    let maker = |(turn, size): (usize, usize)| {
+        let isa = isas[turn % isas.len()];
+        Maker::new(format!("leaves of {size}, {}", isa.name()), move |t| Parts::new(t, size, isa))
+    };
+    [1, 2, 4, 8].into_iter().enumerate().map(maker).collect()
 }
 
 /// Meshes to try.

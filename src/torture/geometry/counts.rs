@@ -16,7 +16,9 @@ pub(super) const COUNTS: Case = Case {
     run: |trial| {
         let mut checks = few(trial, picture);
         checks.extend(many(trial, &kernels()));
-        checks.extend(lights(trial, |intensity| intensity));
+        if !trial.interrupted() {
+            checks.extend(lights(trial, |intensity| intensity));
+        }
         checks
     },
 };
@@ -51,6 +53,9 @@ pub fn few(trial: &Trial<'_>, picture: impl Fn(TriangleMesh, Place, Isa, u32) ->
     for (place, isa) in
         Place::ALL.iter().flat_map(|&place| Isa::available().into_iter().map(move |isa| (place, isa)))
     {
+        if trial.interrupted() {
+            break;
+        }
         let what = format!("{}, {}", place.name(), isa.name());
         let film = picture(TriangleMesh::default(), place, isa, samples);
         checks.push(Check::none(format!("no triangle: {what}"), 192, "pixels", not_one(&film)));
@@ -85,7 +90,7 @@ pub fn many(trial: &Trial<'_>, makers: &[Maker<'_>]) -> Vec<Check> {
         let wrong = answers.wrong_by(right, |_| true);
         Check::none(format!("2^24 + 3 triangles, {}", maker.name), 3, "rays", wrong)
     };
-    makers.iter().map(check).collect()
+    makers.iter().take_while(|_| !trial.interrupted()).map(check).collect()
 }
 
 /// Lamps that are off beside one that is on; `seen` makes of their intensity what is seen of it.

@@ -18,6 +18,7 @@ pub mod slopes;
 pub mod spot;
 pub mod sums;
 pub mod surfaces;
+pub mod terminator;
 pub mod textures;
 pub mod transport;
 
@@ -55,7 +56,7 @@ pub(super) const CASES: &[Case] = &[
     sums::S10,
     slopes::S11,
     slopes::S12,
-    shading::H1,
+    terminator::H1,
     shading::H2,
     surfaces::H3,
     shading::H4,

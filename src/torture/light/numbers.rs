@@ -6,7 +6,7 @@ use super::meter::{Ask, SIGMAS, larger, ours};
 use super::shadows::penumbra;
 use super::spot::{Expected, Spot};
 use crate::torture::stage::Estimate;
-use crate::torture::{Case, Check, Trial};
+use crate::torture::{Case, Check, Effort, Trial};
 use crate::trace::Sampling;
 use crate::trace::sampler::{Sampler, hash, unit_float};
 use glam::{UVec2, Vec2};
@@ -119,13 +119,13 @@ fn scrambling(trial: &Trial<'_>) -> Vec<Check> {
     for samples in [1, 2, 3, 5, 16] {
         for sampling in [Sampling::Independent, Sampling::Stratified, Sampling::Shifted, Sampling::Sobol] {
             let seeds = trial.pick(1, 8, 1000) / u64::from(samples).div_ceil(4) + 1;
-            checks.push(few_samples(trial, &spot, samples, sampling, seeds));
+            checks.extend(few_samples(trial, &spot, samples, sampling, seeds));
         }
     }
     checks
 }
 
-fn few_samples(trial: &Trial<'_>, spot: &Spot, samples: u32, sampling: Sampling, seeds: u64) -> Check {
+fn few_samples(trial: &Trial<'_>, spot: &Spot, samples: u32, sampling: Sampling, seeds: u64) -> Vec<Check> {
     let pixels: Vec<f64> = (0..seeds)
         .into_par_iter()
         .flat_map_iter(|i| {
@@ -133,19 +133,25 @@ fn few_samples(trial: &Trial<'_>, spot: &Spot, samples: u32, sampling: Sampling,
             ours(&Ask { side: 64, sampling, ..Ask::new(spot, samples, seed) }, &|| true).pixels
         })
         .collect();
+    // A fifth of the light's spread by one sample, over the root of all.
+    let bound = if trial.effort == Effort::Long { 1e-3 } else { 5e-3 };
     let exact = match &spot.expected {
         Expected::Value { exact, .. } => exact(spot.point),
         _ => 0.0,
     };
-    unbiased(&format!("{samples} samples, {sampling:?}"), u64::from(samples), &pixels, exact)
+    unbiased(&format!("{samples} samples, {sampling:?}"), u64::from(samples), &pixels, exact, bound)
 }
 
-/// Whether independent estimates are right on average, but for single precision.
+/// Whether independent estimates are right on average, but for single precision; and known well enough to tell.
 #[must_use]
-pub fn unbiased(what: &str, samples: u64, estimates: &[f64], exact: f64) -> Check {
-    let sigmas = Estimate::of(estimates).off(exact, 3e-6 * exact);
+pub fn unbiased(what: &str, samples: u64, estimates: &[f64], exact: f64, bound: f64) -> Vec<Check> {
+    let estimate = Estimate::of(estimates);
     let count = samples * estimates.len() as u64;
-    Check::new(format!("{what}: standard errors off"), count, "samples", sigmas, SIGMAS)
+    let (off, wide) = (estimate.off(exact, 3e-6 * exact), SIGMAS * estimate.sigma / exact);
+    vec![
+        Check::new(format!("{what}: standard errors off"), count, "samples", off, SIGMAS),
+        Check::new(format!("{what}: {SIGMAS} standard errors, relative"), 1, "means", wide, bound),
+    ]
 }
 
 /// Correlation of what is wrong in pixels of a flat picture, `side` × `side`, with that in others near and far.

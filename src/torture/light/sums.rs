@@ -1,6 +1,6 @@
 //! S5, S8, S10: what adds samples up, for as long as anybody likes.
 
-use super::meter::no_light;
+use super::meter::{larger, no_light};
 use crate::app::FrameBudget;
 use crate::load::{LoadOptions, SceneSource, built_in_scenes};
 use crate::open::{Wishes, open};
@@ -50,53 +50,95 @@ fn relative(what: &str, tried: u64, found: f64, exact: f64) -> Check {
 
 /// Many small samples and a large one; and the spread of samples far from zero.
 #[must_use]
-pub fn adding<A: Accumulator>(count: u32, seed: u64) -> Vec<Check> {
+pub fn adding<A: Accumulator>(trial: &Trial<'_>, count: u32) -> Vec<Check> {
     let tried = u64::from(count);
-    let mut sum = A::default();
-    for i in 0..count {
-        sum.add(i, 0.1);
-    }
+    let Some(mut sum) = added::<A>(trial, count, |_| 0.1) else { return Vec::new() };
     sum.add(count, 1e6);
     let n = f64::from(count);
     let mut checks =
         vec![relative("0.1 and once 1e6", tried + 1, sum.mean(), (f64::from(0.1f32) * n + 1e6) / (n + 1.0))];
     // Ones: f32 stops at 2²⁴.
-    let mut ones = A::default();
-    (0..count).for_each(|i| {
-        ones.add(i, 1.0);
-    });
+    let Some(ones) = added::<A>(trial, count, |_| 1.0) else { return checks };
     checks.push(relative("ones", tried, ones.mean(), 1.0));
     // Numbers in [0, 1), multiples of 2⁻²⁴, whose sum integers know.
-    let (mut rng, mut uniform, mut whole) = (Rng(seed), A::default(), 0u64);
-    for i in 0..count {
+    let (mut rng, mut whole) = (Rng(trial.seed), 0u64);
+    let uniform = added::<A>(trial, count, |_| {
         let bits = rng.bits() >> 8;
         whole += u64::from(bits);
-        uniform.add(i, bits as f32 / (1 << 24) as f32);
-    }
+        bits as f32 / (1 << 24) as f32
+    });
+    let Some(uniform) = uniform else { return checks };
     let exact = whole as f64 / f64::from(1 << 24) / n;
     checks.push(relative("numbers in [0, 1)", tried, uniform.mean(), exact));
-    checks.push(spread::<A>(seed));
+    checks.extend(spread::<A>(trial, 1 << 20));
     checks
 }
 
-/// 10,000 ± 0.01, in pixels of two samples: the halves' difference knows the variance, 1e-4, as well as 2¹⁶ samples can.
-fn spread<A: Accumulator>(seed: u64) -> Check {
-    let mut rng = Rng(seed);
-    let pixels = 1 << 15;
-    let (mut found, mut exact) = (0.0, 0.0);
-    for _ in 0..pixels {
-        let mut pixel = A::default();
-        // Sums of twelve uniform numbers are normal enough.
-        let mut normal = || (0..12).map(|_| f64::from(rng.unit())).sum::<f64>() - 6.0;
-        let pair = [0; 2].map(|_| (1e4 + 0.01 * normal()) as f32);
-        for half in 0..2u32 {
-            pixel.add(half, pair[half as usize]);
+/// So many samples in one pixel; `None` if it was interrupted.
+fn added<A: Accumulator>(trial: &Trial<'_>, count: u32, mut sample: impl FnMut(u32) -> f32) -> Option<A> {
+    let mut sum = A::default();
+    for i in 0..count {
+        if i.is_multiple_of(1 << 20) && trial.interrupted() {
+            return None;
         }
+        sum.add(i, sample(i));
+    }
+    Some(sum)
+}
+
+/// 10,000 ± 0.01, whose variance single precision has below 0. A pixel keeps sums of its even and of its odd samples,
+/// and the spread of many pixels' halves is the variance over the samples of a half. So each of 4,096 pixels gets `count` / 4,096
+/// samples, and one of them all; every half is compared with sums of whole numbers, of which samples are multiples
+/// (2⁻¹⁰: one step of floats there), and the variance with the one that these have.
+fn spread<A: Accumulator>(trial: &Trial<'_>, count: u32) -> Vec<Check> {
+    const PIXELS: u32 = 4096;
+    const STEP: f64 = 1.0 / 1024.0;
+    let mut rng = Rng(trial.seed);
+    let mut samples = |pixel: &mut A, count: u32| {
+        let mut whole = [0i64; 2];
+        for i in 0..count {
+            // Sums of twelve uniform numbers are normal enough.
+            let normal = (0..12).map(|_| f64::from(rng.unit())).sum::<f64>() - 6.0;
+            let sample = (1e4 + 0.01 * normal) as f32;
+            whole[i as usize & 1] += (f64::from(sample) / STEP) as i64;
+            pixel.add(i, sample);
+        }
+        whole.map(|sum| sum as f64 * STEP / f64::from(count / 2))
+    };
+    let mut one = A::default();
+    let exact = samples(&mut one, count);
+    let found = one.halves();
+    let off = [0, 1].map(|half| (found[half] / exact[half] - 1.0).abs());
+    let mut checks = vec![Check::new(
+        "halves of 1e4 ± 0.01: relative error",
+        u64::from(count),
+        "samples",
+        larger(off[0], off[1]),
+        1e-12,
+    )];
+    let (mut found, mut exact) = (0.0, 0.0);
+    let each = count / PIXELS;
+    for _ in 0..PIXELS {
+        if trial.interrupted() {
+            return checks;
+        }
+        let mut pixel = A::default();
+        let [a, b] = samples(&mut pixel, each);
+        exact += (a - b).powi(2);
         let [a, b] = pixel.halves();
         found += (a - b).powi(2);
-        exact += (f64::from(pair[0]) - f64::from(pair[1])).powi(2);
     }
-    relative("variance of 1e4 ± 0.01", 2 * pixels, found, exact)
+    // Of one sample: halves of n / 2 have 4 / n of it between them.
+    let variance = |squares: f64| squares * f64::from(each) / 4.0 / f64::from(PIXELS);
+    // Differences of a hundred thousandth of 1e4 lose 8 of 16 digits.
+    let off = (variance(found) / variance(exact) - 1.0).abs();
+    checks.push(Check::new("variance of 1e4 ± 0.01: relative error", u64::from(count), "samples", off, 1e-6));
+    // 1e-4 and what the step of floats adds, a twelfth of its square; 4,096 differences know it to a tenth at 4.5 standard errors.
+    let sure = 4.5 * (2.0 / f64::from(PIXELS)).sqrt();
+    let expected = 1e-4 + STEP * STEP / 12.0;
+    let off = (variance(found) / expected - 1.0).abs();
+    checks.push(Check::new("variance beside 1e-4", u64::from(count), "samples", off, sure));
+    checks
 }
 
 /// 24 hours at 1,000 samples a second: 8.64e7 of a pixel; then as many as indices go, 2³². What comes then still counts.
@@ -219,7 +261,7 @@ pub const S5: Case = Case {
     id: "S5",
     title: "10⁸ samples of a pixel add up, whatever their sizes",
     limit: "1e-12",
-    run: |trial| adding::<Pixel>(trial.pick(1 << 26, 100_000_000, 1_000_000_000) as u32, trial.seed),
+    run: |trial| adding::<Pixel>(trial, trial.pick(1 << 26, 100_000_000, 1_000_000_000) as u32),
 };
 
 /// No numbers.

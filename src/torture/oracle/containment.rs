@@ -5,14 +5,10 @@ use crate::bvh::{Aabb, Blas, WideBvh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Points inside of a triangle, no two with the same weight of a corner; and on each edge, with its ends.
-const INSIDE: usize = 100;
-const ON_EDGE: usize = 20;
-
 /// Checks everything that a traversal relies on, and that no part of any triangle is missing.
 ///
-/// A triangle in one leaf must be inside its box, exactly. Of one that was split, each of 160 points
-/// must be inside the box of one of its leaves.
+/// A triangle in one leaf must be inside its box, exactly. Of one that was split, nothing may be left when the boxes of
+/// its leaves are cut away, in double precision.
 ///
 /// # Errors
 /// What the first defect is.
@@ -64,27 +60,59 @@ pub fn check_hierarchy(hierarchy: &WideBvh, triangles: &[[Vec3; 3]]) -> Result<(
     })
 }
 
-/// A point of the triangle that is in none of the boxes.
+/// A point of the triangle that is in none of the boxes: the middle of what is left of it when they are cut away.
 fn missing_point(corners: &[Vec3; 3], parts: &[(u32, Aabb)]) -> Option<DVec3> {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-    // By so much the sum below may be off, in double precision; a float's own step is 2²⁷ times larger.
-    let rounding = low.abs().max(high.abs()) * (4.0 * f64::EPSILON);
-    // M. Roberts' R2 sequence, folded into the triangle.
-    let inside = (1..=INSIDE).map(|i| {
-        let (u, v) = ((i as f64 * 0.754_877_666_246_693).fract(), (i as f64 * 0.569_840_290_998_053).fract());
-        if u + v < 1.0 { (u, v) } else { (1.0 - u, 1.0 - v) }
-    });
-    let on_edges = (0..ON_EDGE).flat_map(|i| {
-        let s = i as f64 / ON_EDGE as f64;
-        [(s, 0.0), (1.0 - s, s), (0.0, 1.0 - s)]
-    });
-    on_edges.chain(inside).map(|(u, v)| a * (1.0 - u - v) + b * u + c * v).find(|&p| {
-        !parts.iter().any(|(_, part)| {
-            let (min, max) = (part.min.as_dvec3() - rounding, part.max.as_dvec3() + rounding);
-            min.cmple(p).all() && p.cmple(max).all()
-        })
-    })
+    // By so much a corner of what is cut may be off, in double precision; a float's own step is 2²⁶ times larger.
+    let rounding = a.abs().max(b.abs()).max(c.abs()) * (8.0 * f64::EPSILON);
+    let mut left = vec![vec![a, b, c]];
+    for (_, part) in parts {
+        let (min, max) = (part.min.as_dvec3() - rounding, part.max.as_dvec3() + rounding);
+        left = left.into_iter().flat_map(|piece| outside(piece, min, max)).collect();
+    }
+    left.first().map(|piece| piece.iter().sum::<DVec3>() / piece.len() as f64)
+}
+
+/// The pieces of a polygon that are beyond the faces of a box.
+fn outside(mut inside: Vec<DVec3>, min: DVec3, max: DVec3) -> Vec<Vec<DVec3>> {
+    let whole = inside.clone();
+    let mut pieces = Vec::new();
+    for axis in 0..3 {
+        for (sign, face) in [(1.0, max[axis]), (-1.0, -min[axis])] {
+            let height = |p: &DVec3| sign * p[axis] - face;
+            if inside.iter().all(|p| height(p) <= 0.0) {
+                continue;
+            }
+            pieces.push(half(&inside, |p| height(p)));
+            inside = half(&inside, |p| -height(p));
+            if inside.is_empty() {
+                // The box has nothing of it: it stays in one piece.
+                return vec![whole];
+            }
+        }
+    }
+    pieces
+}
+
+/// What of a polygon is at heights above 0, its border included; nothing if it only touches that.
+///
+/// Reference: I. E. Sutherland, G. W. Hodgman, "Reentrant Polygon Clipping", CACM 17(1), 1974.
+fn half(corners: &[DVec3], height: impl Fn(&DVec3) -> f64) -> Vec<DVec3> {
+    if corners.iter().all(|p| height(p) <= 0.0) {
+        return Vec::new();
+    }
+    let mut above = Vec::with_capacity(corners.len() + 1);
+    for (i, a) in corners.iter().enumerate() {
+        let b = &corners[(i + 1) % corners.len()];
+        let (ha, hb) = (height(a), height(b));
+        if ha >= 0.0 {
+            above.push(*a);
+        }
+        if ha > 0.0 && hb < 0.0 || ha < 0.0 && hb > 0.0 {
+            above.push(*a + (*b - *a) * (ha / (ha - hb)));
+        }
+    }
+    above
 }
 
 /// Judged in double precision.
@@ -92,4 +120,34 @@ fn has_surface(corners: &[Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let normal = (b - a).cross(c - a);
     normal.is_finite() && normal != DVec3::ZERO
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn boxes(all: &[[f32; 6]]) -> Vec<(u32, Aabb)> {
+        let aabb = |b: &[f32; 6]| Aabb { min: Vec3::new(b[0], b[1], b[2]), max: Vec3::new(b[3], b[4], b[5]) };
+        all.iter().map(|b| (0, aabb(b))).collect()
+    }
+
+    /// A needle along a diagonal in boxes along it, of which one is missing, or a little too small.
+    #[test]
+    fn what_no_box_holds_is_found() {
+        let needle = [Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 1e-3)];
+        let mut all: Vec<[f32; 6]> = (0..10)
+            .map(|i| {
+                let [from, to] = [i, i + 1].map(|k| k as f32 / 10.0);
+                [from, from, 0.0, to, to, 1e-3]
+            })
+            .collect();
+        assert_eq!(missing_point(&needle, &boxes(&all)), None);
+        let last = all.pop();
+        let p = missing_point(&needle, &boxes(&all)).unwrap();
+        assert!(p.x > 0.9 && p.x < 1.0, "{p}");
+        all.extend(last);
+        // A float's step too small, where no point that somebody chose would be.
+        all[4][3] = all[4][3].next_down();
+        assert!(missing_point(&needle, &boxes(&all)).is_some());
+    }
 }
