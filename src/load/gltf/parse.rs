@@ -1,0 +1,73 @@
+//! JSON → the tree of a file.
+
+use super::animation::AnimationJson;
+use crate::load::error::LoadError;
+use gltf::json::Root;
+use serde::Deserialize;
+
+/// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
+/// and animations.
+#[derive(Deserialize)]
+pub(super) struct More {
+    #[serde(default)]
+    pub(super) nodes: Vec<Placement>,
+    #[serde(default)]
+    pub(super) animations: Vec<AnimationJson>,
+}
+
+/// Placement of one node; see the glTF specification, section 3.5.3.
+#[derive(Default, Deserialize)]
+pub(super) struct Placement {
+    pub(super) matrix: Option<[f64; 16]>,
+    pub(super) translation: Option<[f64; 3]>,
+    pub(super) rotation: Option<[f64; 4]>,
+    pub(super) scale: Option<[f64; 3]>,
+}
+
+pub(super) fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadError> {
+    serde_json::from_slice(json).map_err(|error| {
+        let text = error.to_string();
+        let reason = text.split(" at line ").next().unwrap_or_default();
+        let place = format!("line {} column {}", error.line(), error.column());
+        LoadError::broken(file, place, format!("not valid glTF JSON: {reason}"))
+    })
+}
+
+/// The whole tree, and what is read a second time; once more where that fails without what `gltf::json` knows less of
+/// than the format (animations, of which it has only those of nodes; scenes, to which it denies being empty; whole
+/// numbers that some write as `4.0`).
+pub(super) fn parse_tree(file: &str, json: &[u8]) -> Result<(Root, More), LoadError> {
+    let (tree, more) = match (parse(file, json), parse(file, json)) {
+        (Ok(tree), Ok(more)) => return Ok((tree, more)),
+        either => either,
+    };
+    let mut value: serde_json::Value = parse(file, json)?;
+    write_without_point(&mut value);
+    let more = more.or_else(|why| serde_json::from_value(value.clone()).map_err(|_| why))?;
+    if let Some(root) = value.as_object_mut() {
+        root.remove("animations");
+        let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
+        for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
+            scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
+        }
+    }
+    let tree = tree.or_else(|why| serde_json::from_value(value).map_err(|_| why))?;
+    Ok((tree, more))
+}
+
+/// Makes whole numbers of those that are written as `4.0`, to all depths (`serde_json` allows 128).
+fn write_without_point(value: &mut serde_json::Value) {
+    match value {
+        serde_json::Value::Number(number) => {
+            // Up to here all whole numbers are different numbers in double precision.
+            let whole =
+                number.as_f64().filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 2_f64.powi(53));
+            if let Some(whole) = whole {
+                *number = (whole as i64).into();
+            }
+        }
+        serde_json::Value::Array(items) => items.iter_mut().for_each(write_without_point),
+        serde_json::Value::Object(members) => members.values_mut().for_each(write_without_point),
+        _ => {}
+    }
+}
