@@ -145,7 +145,9 @@ fn read_primitive(
         Ok(Some(elements))
     };
     let Some(positions) = attribute(Semantic::Positions, &[3])? else {
-        return Err(document.broken(place, "no POSITION: nothing says where its vertices are"));
+        // The specification, 3.7.2: whoever reads it should skip it.
+        sink.ignored(file, place, "no POSITION: nothing says where its vertices are");
+        return Ok(None);
     };
     let normals = attribute(Semantic::Normals, &[3])?;
     let texture_coordinates = |set: u32, sink: &mut Sink<'_>| {

@@ -35,7 +35,7 @@ use animation::AnimationJson;
 use bevy_ecs::prelude::*;
 use gltf::json::mesh::Primitive;
 use gltf::json::{Index, Root};
-use parse::Placement;
+use parse::{Lenient, Placement};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ struct Document<'a> {
     folder: &'a Folder,
     root: Root,
     placements: Vec<Placement>,
-    animations: Vec<AnimationJson>,
+    animations: Lenient<Vec<Lenient<AnimationJson>>>,
     /// Which of `KHR_materials_variants` is worn.
     variant: Option<u32>,
     buffers: Vec<buffer::Buffer<'a>>,

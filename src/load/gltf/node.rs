@@ -3,7 +3,8 @@
 use super::deform::{self, Follower};
 use super::material::Palette;
 use super::mesh::{Built, Meshes};
-use super::{Document, Placement, animation, light};
+use super::parse::Placement;
+use super::{Document, animation, light};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::scene::{Instance, MorphWeights, Transform};
@@ -69,7 +70,7 @@ pub(super) fn spawn_scene(
         let mesh = document.at(&document.root.meshes, index, "mesh", &user)?;
         let weights = deform::weights_of(node, mesh);
         let morphs = weights.iter().any(|&weight| weight != 0.0)
-            || (!weights.is_empty() && !document.animations.is_empty());
+            || (!weights.is_empty() && document.animations.good().is_some_and(|all| !all.is_empty()));
         // The format: the transform of a skinned mesh's own node does not count.
         let holder = node.skin.as_ref().map(|_| {
             sink.spawn((Name::new(format!("{user} (skinned)")), Transform::default(), ChildOf(root)))

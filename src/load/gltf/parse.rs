@@ -4,6 +4,7 @@ use super::animation::AnimationJson;
 use crate::load::error::LoadError;
 use gltf::json::Root;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 /// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
 /// and animations.
@@ -12,7 +13,46 @@ pub(super) struct More {
     #[serde(default)]
     pub(super) nodes: Vec<Placement>,
     #[serde(default)]
-    pub(super) animations: Vec<AnimationJson>,
+    pub(super) animations: Lenient<Vec<Lenient<AnimationJson>>>,
+}
+
+/// What may be damaged without harm to the rest.
+#[derive(Deserialize)]
+#[serde(untagged)]
+pub(super) enum Lenient<T> {
+    /// As the format says.
+    Good(T),
+    /// Something else.
+    Bad(IgnoredAny),
+}
+
+impl<T: Default> Default for Lenient<T> {
+    fn default() -> Self {
+        Self::Good(T::default())
+    }
+}
+
+impl<T> Lenient<T> {
+    pub(super) fn good(&self) -> Option<&T> {
+        match self {
+            Self::Good(value) => Some(value),
+            Self::Bad(_) => None,
+        }
+    }
+}
+
+/// A number of something, also if it is written as `4.0`.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "f64")]
+pub(super) struct Whole(pub(super) u32);
+
+impl TryFrom<f64> for Whole {
+    type Error = &'static str;
+
+    fn try_from(number: f64) -> Result<Self, Self::Error> {
+        let whole = number as u32;
+        if f64::from(whole) == number { Ok(Self(whole)) } else { Err("not a number of something") }
+    }
 }
 
 /// Placement of one node; see the glTF specification, section 3.5.3.
