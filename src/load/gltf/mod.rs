@@ -50,9 +50,9 @@ pub(super) fn load(
 ) -> Result<(), LoadError> {
     sink.begin(Phase::Parsing);
     let container = container::split(file, &bytes)?;
-    let json = without_bom(container.json);
-    head::check(file, json, sink)?;
-    let (tree, more) = parse::parse_tree(file, json)?;
+    let json = parse::as_utf8(file, without_bom(container.json), sink)?;
+    head::check(file, &json, sink)?;
+    let (tree, more) = parse::parse_tree(file, &json)?;
     sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {

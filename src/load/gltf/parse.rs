@@ -2,9 +2,11 @@
 
 use super::animation::AnimationJson;
 use crate::load::error::LoadError;
+use crate::load::report::Sink;
 use gltf::json::Root;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use std::borrow::Cow;
 
 /// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
 /// and animations.
@@ -62,6 +64,28 @@ pub(super) struct Placement {
     pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f64; 4]>,
     pub(super) scale: Option<[f64; 3]>,
+}
+
+/// Text that is not UTF-8 is a mix: what is none of it stands for Latin-1, as some exporters write names.
+pub(super) fn as_utf8<'a>(
+    file: &str,
+    json: &'a [u8],
+    sink: &mut Sink<'_>,
+) -> Result<Cow<'a, [u8]>, LoadError> {
+    if std::str::from_utf8(json).is_ok() {
+        return Ok(Cow::Borrowed(json));
+    }
+    sink.budget.take(2 * json.len() as u64, file, "JSON")?;
+    let mut text = String::with_capacity(json.len() + json.len() / 8);
+    let mut odd = 0;
+    for chunk in json.utf8_chunks() {
+        text.push_str(chunk.valid());
+        text.extend(chunk.invalid().iter().map(|&byte| char::from(byte)));
+        odd += chunk.invalid().len();
+    }
+    let what = format!("bytes of its JSON are not UTF-8: taken for Latin-1, so a name may look odd: {odd}");
+    sink.repaired(file, "", what);
+    Ok(Cow::Owned(text.into_bytes()))
 }
 
 pub(super) fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadError> {
