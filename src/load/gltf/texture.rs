@@ -5,7 +5,6 @@ use super::{Document, buffer};
 use crate::load::error::{LoadError, ReadError};
 use crate::load::picture::{self, Picture};
 use crate::load::report::Sink;
-use crate::load::source::IMAGE_LIMIT;
 use crate::scene::{Encoding, Filter, Texels, Texture, TextureUse, Wrap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -87,7 +86,7 @@ impl<'a> Textures<'a> {
                 };
                 let user = format!("texture {}", used.index.value());
                 let image = document.at(&root.images, &Index::new(source as u32), "image", &user)?;
-                wanted.entry(source).or_insert_with(|| picture_of(document, source, image));
+                wanted.entry(source).or_insert_with(|| picture_of(document, source, image, sink));
             }
         }
         let (indices, pictures): (Vec<usize>, Vec<Picture<'_>>) = wanted.into_iter().unzip();
@@ -152,12 +151,22 @@ fn source_of(texture: &json::Texture) -> Option<usize> {
     extension("EXT_texture_webp").or(core).or_else(|| extension("KHR_texture_basisu"))
 }
 
-fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image) -> Picture<'d> {
+fn picture_of<'d>(
+    document: &'d Document<'_>,
+    index: usize,
+    image: &json::Image,
+    sink: &mut Sink<'_>,
+) -> Picture<'d> {
     let mut label = format!("image {index}");
     let bytes = match (&image.uri, &image.buffer_view) {
         (Some(uri), _) => {
             label = format!("image {index} ({})", buffer::shorten(uri));
-            buffer::read_uri(document.folder, uri, IMAGE_LIMIT)
+            let (bytes, elsewhere) = buffer::read_image(document.folder, uri);
+            if elsewhere {
+                let what = "is not where the file says: the one of that name beside the scene instead";
+                sink.repaired(document.file, &label, what);
+            }
+            bytes
         }
         (None, Some(view)) => document
             .view(view, &label)
