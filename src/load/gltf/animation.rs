@@ -109,6 +109,7 @@ fn convert(
     sink: &mut Sink<'_>,
 ) -> Animation {
     let mut animation = Animation::default();
+    let mut moved: HashSet<(Entity, Property)> = HashSet::new();
     let place = format!("animation {index}");
     for channel in &json.channels {
         let Lenient::Good(channel) = channel else {
@@ -140,6 +141,11 @@ fn convert(
                 continue;
             }
         };
+        // The format forbids it; what it would show is anyone's guess.
+        if !moved.insert((target, property)) {
+            sink.ignored(document.file, &place, "channel that moves what another one of its animation moves");
+            continue;
+        }
         let curve = match curve(document, sampler, property, &place) {
             Ok(curve) => curve,
             Err(why) => {
@@ -187,6 +193,9 @@ fn curve(
     if input.width != 1 || keys == 0 || width == 0 || output.width != element || output.count != values {
         return Err("keyframes and values do not match".to_owned());
     }
+    let memory = 4 * (keys as u64 + (output.count * element) as u64);
+    let too_large = |_| "too large for the memory allowed (see --max-memory)".to_owned();
+    document.budget.take(memory, document.file, place).map_err(too_large)?;
     let times: Vec<f32> = (0..keys).map(|i| input.get_f32::<1>(i)[0]).collect();
     if !times.iter().all(|time| time.is_finite()) || times.windows(2).any(|pair| pair[0] > pair[1]) {
         return Err("times of keyframes do not ascend".to_owned());

@@ -1,9 +1,13 @@
 //! What is asked of a file before anything else: its version, and which extensions it needs.
 
-use super::parse::parse;
+use super::parse::{self, OBJECT_MEMORY, Placement, VALUE_MEMORY, parse};
+use super::place::NODE_MEMORY;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
+use crate::scene::Material;
+use gltf::json;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 /// Extensions that are honoured wholly or closely enough to accept a file that requires them.
 const SUPPORTED: &[&str] = &[
@@ -44,6 +48,42 @@ struct Head {
     extensions_required: Vec<String>,
     #[serde(default)]
     extensions_used: Vec<String>,
+    // Counted only: what is ignored takes no memory.
+    #[serde(default)]
+    nodes: Vec<IgnoredAny>,
+    #[serde(default)]
+    materials: Vec<IgnoredAny>,
+    #[serde(default)]
+    meshes: Vec<IgnoredAny>,
+    #[serde(default)]
+    accessors: Vec<IgnoredAny>,
+    #[serde(default)]
+    buffer_views: Vec<IgnoredAny>,
+    #[serde(default)]
+    images: Vec<IgnoredAny>,
+    #[serde(default)]
+    textures: Vec<IgnoredAny>,
+}
+
+impl Head {
+    /// Bytes that reading the whole tree takes, and what becomes of its nodes and materials: `{}` is three bytes in a file
+    /// and hundreds in memory.
+    fn memory(&self, json: &[u8]) -> u64 {
+        // Lists grow by doubling.
+        let kinds = [
+            (&self.nodes, 2 * (size_of::<json::Node>() + size_of::<Placement>()) + NODE_MEMORY),
+            (&self.materials, 2 * size_of::<json::Material>() + size_of::<Material>()),
+            (&self.meshes, 2 * size_of::<json::Mesh>()),
+            (&self.accessors, 2 * size_of::<json::Accessor>()),
+            (&self.buffer_views, 2 * size_of::<json::buffer::View>()),
+            (&self.images, 2 * size_of::<json::Image>()),
+            (&self.textures, 2 * size_of::<json::Texture>()),
+        ];
+        let listed: u64 = kinds.iter().map(|(list, _)| list.len() as u64).sum();
+        let all: u64 = kinds.iter().map(|(list, size)| list.len() as u64 * *size as u64).sum();
+        let [objects, values] = parse::objects_and_values(json);
+        all + objects.saturating_sub(listed) * OBJECT_MEMORY + values * VALUE_MEMORY + json.len() as u64
+    }
 }
 
 #[derive(Deserialize)]
@@ -60,6 +100,7 @@ pub(super) fn check(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), 
         return Err(LoadError::broken(file, "content", "the JSON is empty"));
     }
     let head: Head = parse(file, json)?;
+    sink.budget.take(head.memory(json), file, "JSON")?;
     let version = |value: Option<serde_json::Value>| match value {
         Some(serde_json::Value::String(text)) => text,
         Some(other) => other.to_string(),
@@ -85,14 +126,20 @@ pub(super) fn check(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), 
             });
         }
     }
-    let ignored: Vec<&str> =
-        head.extensions_used.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect();
-    if !ignored.is_empty() {
-        for name in ignored {
-            sink.ignored(file, "", format!("extension {name} is not supported"));
-        }
-    }
+    head.extensions_used.iter().for_each(|name| tell_if_unsupported(file, name, sink));
     Ok(())
+}
+
+fn tell_if_unsupported(file: &str, name: &str, sink: &mut Sink<'_>) {
+    if !SUPPORTED.contains(&name) {
+        sink.ignored(file, "", format!("extension {name} is not supported"));
+    }
+}
+
+/// Tells what a material uses and we do not know, whether the file lists it or not.
+pub(super) fn tell_unsupported(file: &str, material: &json::Material, sink: &mut Sink<'_>) {
+    let extensions = material.extensions.iter().flat_map(|extensions| extensions.others.keys());
+    extensions.for_each(|name| tell_if_unsupported(file, name, sink));
 }
 
 fn way_out(extension: &str) -> &'static str {

@@ -23,6 +23,7 @@ mod mesh;
 mod meshopt;
 mod node;
 mod parse;
+mod place;
 mod texture;
 mod vertices;
 
@@ -35,7 +36,7 @@ use animation::AnimationJson;
 use bevy_ecs::prelude::*;
 use gltf::json::mesh::Primitive;
 use gltf::json::{Index, Root};
-use parse::{Lenient, Placement};
+use parse::{Lenient, MeshMore, Placement};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -52,7 +53,7 @@ pub(super) fn load(
     let container = container::split(file, &bytes)?;
     let json = parse::as_utf8(file, without_bom(container.json), sink)?;
     head::check(file, &json, sink)?;
-    let (tree, more) = parse::parse_tree(file, &json)?;
+    let (tree, more) = parse::parse_tree(file, &json, &sink.budget)?;
     sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
@@ -60,6 +61,7 @@ pub(super) fn load(
         folder,
         root: tree,
         placements: more.nodes,
+        meshes: more.meshes,
         animations: more.animations,
         variant: None,
         unpacked: Vec::new(),
@@ -84,6 +86,7 @@ struct Document<'a> {
     folder: &'a Folder,
     root: Root,
     placements: Vec<Placement>,
+    meshes: Vec<MeshMore>,
     animations: Lenient<Vec<Lenient<AnimationJson>>>,
     /// Which of `KHR_materials_variants` is worn.
     variant: Option<u32>,

@@ -1,21 +1,65 @@
 //! JSON → the tree of a file.
 
 use super::animation::AnimationJson;
+use crate::load::budget::Budget;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use gltf::json::Root;
+use rayon::prelude::*;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::borrow::Cow;
 
+/// Bytes that an object within another takes: maps have room for eleven members.
+pub(super) const OBJECT_MEMORY: u64 = 600;
+/// Bytes that a value takes: of those that are kept as they are.
+pub(super) const VALUE_MEMORY: u64 = 32;
+
+/// About how many objects and values there are in the text.
+pub(super) fn objects_and_values(json: &[u8]) -> [u64; 2] {
+    let count =
+        |wanted: u8| json.par_iter().with_min_len(1 << 16).filter(|&&byte| byte == wanted).count() as u64;
+    [count(b'{'), count(b',')]
+}
+
 /// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
-/// and animations.
+/// what morph targets move, and animations.
 #[derive(Deserialize)]
 pub(super) struct More {
     #[serde(default)]
     pub(super) nodes: Vec<Placement>,
     #[serde(default)]
+    pub(super) meshes: Vec<MeshMore>,
+    #[serde(default)]
     pub(super) animations: Lenient<Vec<Lenient<AnimationJson>>>,
+}
+
+/// What `gltf::json` does not keep of a mesh.
+#[derive(Deserialize)]
+pub(super) struct MeshMore {
+    #[serde(default)]
+    primitives: Vec<PrimitiveMore>,
+}
+
+#[derive(Deserialize)]
+struct PrimitiveMore {
+    targets: Option<Vec<TargetMore>>,
+}
+
+#[derive(Deserialize)]
+struct TargetMore {
+    #[serde(rename = "COLOR_0")]
+    color: Option<IgnoredAny>,
+    #[serde(rename = "TEXCOORD_0")]
+    uvs: Option<IgnoredAny>,
+}
+
+impl MeshMore {
+    /// Whether morph targets of a primitive move more than places and directions.
+    pub(super) fn moves_more(&self, primitive: usize) -> bool {
+        let targets = self.primitives.get(primitive).and_then(|primitive| primitive.targets.as_ref());
+        targets.into_iter().flatten().any(|target| target.color.is_some() || target.uvs.is_some())
+    }
 }
 
 /// What may be damaged without harm to the rest.
@@ -100,14 +144,17 @@ pub(super) fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Resul
 /// The whole tree, and what is read a second time; once more where that fails without what `gltf::json` knows less of
 /// than the format (animations, of which it has only those of nodes; scenes, to which it denies being empty; whole
 /// numbers that some write as `4.0`).
-pub(super) fn parse_tree(file: &str, json: &[u8]) -> Result<(Root, More), LoadError> {
+pub(super) fn parse_tree(file: &str, json: &[u8], budget: &Budget) -> Result<(Root, More), LoadError> {
     let (tree, more) = match (parse(file, json), parse(file, json)) {
         (Ok(tree), Ok(more)) => return Ok((tree, more)),
         either => either,
     };
+    let [objects, values] = objects_and_values(json);
+    let memory = objects * OBJECT_MEMORY + 2 * values * VALUE_MEMORY + json.len() as u64;
+    budget.take(memory, file, "JSON")?;
     let mut value: serde_json::Value = parse(file, json)?;
     write_without_point(&mut value);
-    let more = more.or_else(|why| serde_json::from_value(value.clone()).map_err(|_| why))?;
+    let more = more.or_else(|why| More::deserialize(&value).map_err(|_| why))?;
     if let Some(root) = value.as_object_mut() {
         root.remove("animations");
         let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
