@@ -6,8 +6,9 @@ use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::scene::Material;
 use gltf::json;
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::{IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
 
 /// Extensions that are honoured wholly or closely enough to accept a file that requires them.
 const SUPPORTED: &[&str] = &[
@@ -48,21 +49,51 @@ struct Head {
     extensions_required: Vec<String>,
     #[serde(default)]
     extensions_used: Vec<String>,
-    // Counted only: what is ignored takes no memory.
     #[serde(default)]
-    nodes: Vec<IgnoredAny>,
+    nodes: Count,
     #[serde(default)]
-    materials: Vec<IgnoredAny>,
+    materials: Count,
     #[serde(default)]
-    meshes: Vec<IgnoredAny>,
+    meshes: Count,
     #[serde(default)]
-    accessors: Vec<IgnoredAny>,
+    accessors: Count,
     #[serde(default)]
-    buffer_views: Vec<IgnoredAny>,
+    buffer_views: Count,
     #[serde(default)]
-    images: Vec<IgnoredAny>,
+    images: Count,
     #[serde(default)]
-    textures: Vec<IgnoredAny>,
+    textures: Count,
+}
+
+/// How many things are in a list, without keeping any; what is no list, as in files of version 1, has none.
+#[derive(Default)]
+struct Count(u64);
+
+impl<'de> Deserialize<'de> for Count {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Counter;
+        impl<'de> Visitor<'de> for Counter {
+            type Value = Count;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Count, A::Error> {
+                let mut count = 0;
+                while list.next_element::<IgnoredAny>()?.is_some() {
+                    count += 1;
+                }
+                Ok(Count(count))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Count, A::Error> {
+                while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+                Ok(Count(0))
+            }
+        }
+        deserializer.deserialize_any(Counter)
+    }
 }
 
 impl Head {
@@ -79,8 +110,8 @@ impl Head {
             (&self.images, 2 * size_of::<json::Image>()),
             (&self.textures, 2 * size_of::<json::Texture>()),
         ];
-        let listed: u64 = kinds.iter().map(|(list, _)| list.len() as u64).sum();
-        let all: u64 = kinds.iter().map(|(list, size)| list.len() as u64 * *size as u64).sum();
+        let listed: u64 = kinds.iter().map(|(list, _)| list.0).sum();
+        let all: u64 = kinds.iter().map(|(list, size)| list.0 * *size as u64).sum();
         let [objects, values] = parse::objects_and_values(json);
         all + objects.saturating_sub(listed) * OBJECT_MEMORY + values * VALUE_MEMORY + json.len() as u64
     }

@@ -106,6 +106,12 @@ fn a_few_bytes_cannot_ask_for_more_memory_than_allowed() {
 }
 
 #[test]
+fn a_file_of_version_1_is_called_so_although_its_lists_are_none() {
+    let text = r#"{"asset":{"version":"1.0"},"nodes":{"a":{}},"meshes":{},"materials":{"b":{"c":[1,2]}}}"#;
+    assert_says(&refusal("a.gltf", text), "glTF version 1.0; Penumbra reads 2.0");
+}
+
+#[test]
 fn curves_that_do_not_fit_are_left_out_and_no_two_move_the_same() {
     let zeros = |kind: &str| format!(r#"{{"componentType":5126,"count":400000,"type":"{kind}"}}"#);
     let channel = |node: u32| format!(r#"{{"sampler":0,"target":{{"node":{node},"path":"translation"}}}}"#);
