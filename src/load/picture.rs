@@ -96,8 +96,8 @@ pub(super) fn stand_in() -> Arc<Texels> {
 
 /// Bytes that decoding takes: the texels, and the picture as its decoder has it.
 fn memory(bytes: &[u8]) -> Option<u64> {
-    if let Some([width, height]) = ktx2::size(bytes) {
-        return Some(8 * u64::from(width) * u64::from(height));
+    if ktx2::size(bytes).is_some() {
+        return ktx2::memory(bytes);
     }
     let decoder = reader_of(bytes).ok()?.into_decoder().ok()?;
     let (width, height) = decoder.dimensions();
