@@ -24,8 +24,8 @@ pub(super) fn not_a_scene(bytes: &[u8]) -> Option<&'static str> {
         (b"#usda", "a USD file: convert it to glTF"),
         (b"PXR-USDC", "a USD file: convert it to glTF"),
         (b"%PDF", "a PDF file, not a scene"),
-        (b"\x89PNG", "a picture (PNG), not a scene"),
-        (b"\xff\xd8\xff", "a picture (JPEG), not a scene"),
+        (b"\x89PNG", "a picture in PNG format, not a scene"),
+        (b"\xff\xd8\xff", "a picture in JPEG format, not a scene"),
     ];
     if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| bytes.starts_with(magic)) {
         return Some(what);

@@ -177,9 +177,9 @@ fn attribute<'d>(
 /// for each corner.
 pub(super) fn take_for(document: &Document<'_>, parts: &[Part], place: &str) -> Result<(), LoadError> {
     let any_normals = parts.iter().any(|part| part.normals.is_some());
-    let vertices = |part: &Part| match any_normals && part.normals.is_none() {
-        true => part.positions.len().max(3 * part.triangles.len()),
-        false => part.positions.len(),
+    let vertices = |part: &Part| {
+        let corners = if any_normals && part.normals.is_none() { 3 * part.triangles.len() } else { 0 };
+        part.positions.len().max(corners)
     };
     let vertices: usize = parts.iter().map(vertices).sum();
     take(document, vertices, most_of(parts), place)
