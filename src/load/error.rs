@@ -98,7 +98,7 @@ pub enum ReadError {
         limit: u64,
     },
     /// The reference leaves the folder of the scene.
-    #[error("lies outside the scene's folder and is not opened")]
+    #[error("lies outside the scene's folder and is not opened; put the file beside the scene")]
     Outside,
     /// The reference is a URL.
     #[error("is a URI with the scheme `{0}`, which is not opened; put the file beside the scene")]

@@ -232,15 +232,27 @@ fn sign(i: u32, bit: u32) -> f64 {
     if i & bit == 0 { -1.0 } else { 1.0 }
 }
 
-/// Whether anything shines: a light, or an emissive material on an instance.
+/// Whether anything shines: a light that is not out, or an emissive material on an instance.
 fn has_light(world: &mut World) -> bool {
-    if world.query::<&Light>().iter(world).next().is_some() {
+    if world.query::<&Light>().iter(world).any(|light| !is_out(light)) {
         return true;
     }
     let instances = world.query::<&Instance>();
     let shines =
         |&material: &Entity| world.get::<Material>(material).is_some_and(|m| m.emission != Vec3::ZERO);
     instances.iter_manual(world).any(|instance| instance.materials.iter().any(shines))
+}
+
+/// Whether a lamp gives no light; who writes a black environment wants it dark.
+fn is_out(light: &Light) -> bool {
+    match light {
+        Light::Point { intensity } | Light::Spot { intensity, .. } => *intensity == Vec3::ZERO,
+        Light::Directional { irradiance, .. } => *irradiance == Vec3::ZERO,
+        Light::Segment { strength, .. } => *strength == [Vec3::ZERO; 2],
+        Light::Parallelogram { radiance, .. } => *radiance == [Vec3::ZERO; 4],
+        Light::Disk { radiance, .. } | Light::Sphere { radiance, .. } => *radiance == Vec3::ZERO,
+        Light::Environment { .. } | Light::Sky { .. } => false,
+    }
 }
 
 /// How decisions name what [`light_for`] adds.

@@ -13,6 +13,17 @@ pub(super) fn size(bytes: &[u8]) -> Option<[u32; 2]> {
     Some([word(bytes, 20)?, word(bytes, 24)?])
 }
 
+/// Bytes that decoding takes as the header says, if this is KTX2: texels twice, and the largest level unpacked.
+pub(super) fn memory(bytes: &[u8]) -> Option<u64> {
+    let [width, height] = size(bytes)?;
+    let levels = word(bytes, 40).unwrap_or(0).clamp(1, 32) as usize;
+    let unpacked = (0..levels).filter_map(|level| {
+        let at = 80 + 24 * level + 16;
+        bytes.get(at..at + 8)?.try_into().ok().map(u64::from_le_bytes)
+    });
+    Some((8 * u64::from(width) * u64::from(height)).saturating_add(unpacked.max().unwrap_or(0)))
+}
+
 /// Decodes the largest level.
 pub(super) fn decode(bytes: &[u8], most_texels: u64) -> Result<Texels, String> {
     let (Some([width, height]), Some(format)) = (size(bytes), word(bytes, 12)) else {

@@ -14,6 +14,7 @@ mod builtin;
 mod card;
 mod error;
 mod files;
+mod first_bytes;
 mod framing;
 mod geometry;
 mod gltf;

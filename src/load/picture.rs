@@ -16,8 +16,8 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-/// Most texels of one picture: 8192 squared, 256 MiB decoded.
-const MOST_TEXELS: u64 = 1 << 26;
+/// Most texels of one picture, however much memory there is: 32768 squared, 4 GiB decoded.
+const MOST_TEXELS: u64 = 1 << 30;
 
 /// A picture to decode.
 pub(super) struct Picture<'a> {
@@ -45,12 +45,12 @@ pub(super) fn decode_all(
     pictures: &[Picture<'_>],
     sink: &mut Sink<'_>,
 ) -> Vec<Option<Arc<Texels>>> {
-    // Decoders need as much again for a while.
+    // What decoders make of it is there beside it for a while.
     let affordable: Vec<bool> = pictures
         .iter()
         .map(|picture| {
-            let texels = picture.bytes.as_ref().ok().and_then(|bytes| texel_count(bytes)).unwrap_or(0);
-            sink.budget.take(8 * texels, file, &picture.label).is_ok()
+            let memory = picture.bytes.as_ref().ok().and_then(|bytes| memory(bytes)).unwrap_or(0);
+            sink.budget.take(memory, file, &picture.label).is_ok()
         })
         .collect();
     let done = AtomicUsize::new(0);
@@ -94,12 +94,14 @@ pub(super) fn stand_in() -> Arc<Texels> {
     Arc::new(Texels { width: 8, height: 8, texels })
 }
 
-fn texel_count(bytes: &[u8]) -> Option<u64> {
-    if let Some([width, height]) = ktx2::size(bytes) {
-        return Some(u64::from(width) * u64::from(height));
+/// Bytes that decoding takes: the texels, and the picture as its decoder has it.
+fn memory(bytes: &[u8]) -> Option<u64> {
+    if ktx2::size(bytes).is_some() {
+        return ktx2::memory(bytes);
     }
-    let (width, height) = reader_of(bytes).ok()?.into_dimensions().ok()?;
-    Some(u64::from(width) * u64::from(height))
+    let decoder = reader_of(bytes).ok()?.into_decoder().ok()?;
+    let (width, height) = decoder.dimensions();
+    Some((4 * u64::from(width) * u64::from(height)).saturating_add(decoder.total_bytes()))
 }
 
 /// By the first bytes and not by the name; TGA has none of its own, but a header in which little is possible.
@@ -154,10 +156,11 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels,
         return Err("image is empty (0 texels)".to_owned());
     }
     if texels > MOST_TEXELS {
-        return Err(format!("image of {width} x {height} is too large (limit {MOST_TEXELS} texels)"));
+        let most = "more than 32768 x 32768 texels: scale it down";
+        return Err(format!("image of {width} x {height} is too large ({most})"));
     }
     let mut limits = Limits::default();
-    limits.max_alloc = Some(16 * MOST_TEXELS);
+    limits.max_alloc = Some(16 * texels + (64 << 20));
     decoder.set_limits(limits).map_err(|error| describe(&error))?;
     if format == ImageFormat::Jpeg && jpeg_components(bytes) == Some(4) {
         remarks.push(Note(Kind::Approximated, "CMYK JPEG image: its colours are approximate".to_owned()));

@@ -204,6 +204,31 @@ fn a_damaged_animation_costs_only_itself() {
     assert_eq!(with(&text, &at(1.0)).1.animations.len(), 3);
     let text = moving().replacen(r#""input":1"#, r#""input":77"#, 1);
     assert_says(&with(&text, &at(1.0)).1.warnings().join("\n"), "damaged channel");
+    // What is of another type altogether: an interpolation, a node, a path, an animation, all of them.
+    let sampler = moving().replacen(r#""output":2}"#, r#""output":2,"interpolation":0}"#, 1);
+    let lost = moving().replacen(r#""target":{"node":0,"#, r#""target":{"node":-1,"#, 1);
+    let aimless = moving().replacen(r#""path":"translation""#, r#""path":{}"#, 1);
+    let odd = moving().replacen(r#""animations":["#, r#""animations":["go","#, 1);
+    for text in [sampler, lost, aimless, odd] {
+        let (mut world, report) = with(&text, &at(1.0));
+        assert_says(&report.warnings().join("\n"), "not as the format says");
+        assert_eq!(report.warnings().len(), 1, "{:?}", report.warnings());
+        // The third turns all the same.
+        assert!(place(&mut world, "two") != DAffine3::IDENTITY, "{text}");
+    }
+    let none = moving().replace(r#""animations":["#, r#""animations":7,"extras":["#);
+    assert_says(
+        &with(&none, &LoadOptions::default()).1.warnings().join("\n"),
+        "animations: not as the format says",
+    );
+}
+
+#[test]
+fn numbers_of_samplers_and_nodes_may_be_written_with_a_point() {
+    let text = moving().replace(r#""sampler":0"#, r#""sampler":0.0"#).replace(r#""node":0"#, r#""node":0.0"#);
+    let (mut world, report) = with(&text, &at(1.0));
+    assert_eq!(report.warnings(), Vec::<String>::new());
+    assert_eq!(place(&mut world, "one").translation, DVec3::X * 2.0);
 }
 
 #[test]

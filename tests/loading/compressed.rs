@@ -90,12 +90,34 @@ fn damaged_compression_is_refused_with_its_place() {
     }
 }
 
+/// A file of which two primitives name one compressed view.
+fn twice(draco: &[u8]) -> Vec<u8> {
+    let end = 20 + u32::from_le_bytes(draco[12..16].try_into().unwrap()) as usize;
+    let mut json: serde_json::Value = serde_json::from_slice(&draco[20..end]).unwrap();
+    let primitives = json["meshes"][0]["primitives"].as_array_mut().unwrap();
+    primitives.push(primitives[0].clone());
+    let json = json.to_string();
+    let size = json.len().next_multiple_of(4);
+    let head = [12 + 8 + size + draco.len() - end, size].map(|length| (length as u32).to_le_bytes());
+    let [total, size_of_json] = head;
+    [b"glTF\x02\0\0\0", &total[..], &size_of_json, b"JSON", format!("{json:size$}").as_bytes(), &draco[end..]]
+        .concat()
+}
+
+#[test]
+fn a_compressed_view_may_be_named_twice() {
+    let name = "wave-draco.glb";
+    let (_, report) = loaded_all(&[(name, &twice(&std::fs::read(path(name)).unwrap()))]);
+    assert_eq!((report.triangles, report.warnings()), (256, Vec::new()));
+}
+
 fn textured(image: &str) -> String {
     let mut file = Builder::default();
     let positions = file.floats("VEC3", &builder::TRIANGLE);
+    let uvs = file.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
     file.finish(&format!(
         r#""extensionsRequired":["KHR_texture_basisu"],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":{positions}}},"material":0}}]}}],"nodes":[{{"mesh":0}}],"scenes":[{{"nodes":[0]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":{positions},"TEXCOORD_0":{uvs}}},"material":0}}]}}],"nodes":[{{"mesh":0}}],"scenes":[{{"nodes":[0]}}],
         "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
         "textures":[{{"extensions":{{"KHR_texture_basisu":{{"source":0}}}}}}],"images":[{{"uri":"{image}"}}]"#
     ))

@@ -106,3 +106,16 @@ fn all_is_seen_in_a_narrow_picture_too() {
         }
     }
 }
+
+#[test]
+fn a_lamp_that_is_out_is_no_light() {
+    let lamp = |intensity: &str| {
+        let more = format!(
+            r#","extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":{intensity}}}]}}}}"#
+        );
+        let node = r#","extensions":{"KHR_lights_punctual":{"light":0}}"#;
+        loaded("a.gltf", &gltf_triangle(node, "", &more)).1.decisions().join("\n")
+    };
+    assert_says(&lamp("0"), "no light in it");
+    assert!(!lamp("1").contains("no light in it"));
+}

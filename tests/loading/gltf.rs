@@ -1,5 +1,7 @@
 //! glTF.
 
+mod wild;
+
 use super::*;
 
 #[test]

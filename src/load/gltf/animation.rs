@@ -1,6 +1,7 @@
 //! Animations → [`Animation`] entities. One that is damaged is left out; it never costs the scene.
 
 use super::Document;
+use super::parse::{Lenient, Whole};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::scene::{
@@ -13,31 +14,32 @@ use serde::Deserialize;
 use std::collections::HashSet;
 
 /// As it stands in the file; `gltf::json` refuses channels without a node, which extensions make.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(super) struct AnimationJson {
-    name: Option<String>,
     #[serde(default)]
-    channels: Vec<ChannelJson>,
+    name: Lenient<Option<String>>,
     #[serde(default)]
-    samplers: Vec<SamplerJson>,
+    channels: Vec<Lenient<ChannelJson>>,
+    #[serde(default)]
+    samplers: Vec<Lenient<SamplerJson>>,
 }
 
 #[derive(Deserialize)]
 struct ChannelJson {
-    sampler: usize,
+    sampler: Whole,
     target: TargetJson,
 }
 
 #[derive(Deserialize)]
 struct TargetJson {
-    node: Option<usize>,
+    node: Option<Whole>,
     path: String,
 }
 
 #[derive(Deserialize)]
 struct SamplerJson {
-    input: u32,
-    output: u32,
+    input: Whole,
+    output: Whole,
     interpolation: Option<String>,
 }
 
@@ -51,13 +53,22 @@ pub(super) fn spawn_all(
     let mut spawned = Vec::new();
     let mut moved: HashSet<(Entity, Property)> = HashSet::new();
     let mut together = Vec::new();
-    for (i, json) in document.animations.iter().enumerate() {
+    let all = document.animations.good();
+    if all.is_none() {
+        sink.ignored(document.file, "animations", "not as the format says: left out");
+    }
+    let nothing = AnimationJson::default();
+    for (i, json) in all.into_iter().flatten().enumerate() {
+        let json = json.good().unwrap_or_else(|| {
+            sink.ignored(document.file, &format!("animation {i}"), "not as the format says: left out");
+            &nothing
+        });
         let animation = convert(document, i, json, entities, sink);
-        let name = json.name.clone().unwrap_or_else(|| format!("animation {i}"));
-        let entity = sink.spawn((Name::new(name.clone()), animation.clone()));
-        spawned.push((name, entity));
+        let name = json.name.good().cloned().flatten().unwrap_or_else(|| format!("animation {i}"));
         // Animations of different things play side by side; of the same thing, the first one does.
         let targets: Vec<_> = animation.channels.iter().map(|c| (c.target, c.property)).collect();
+        let entity = sink.spawn((Name::new(name.clone()), animation));
+        spawned.push((name, entity));
         if targets.iter().all(|target| !moved.contains(target)) {
             moved.extend(targets);
             together.push(entity);
@@ -98,8 +109,13 @@ fn convert(
     sink: &mut Sink<'_>,
 ) -> Animation {
     let mut animation = Animation::default();
+    let mut moved: HashSet<(Entity, Property)> = HashSet::new();
     let place = format!("animation {index}");
     for channel in &json.channels {
+        let Lenient::Good(channel) = channel else {
+            sink.ignored(document.file, &place, "channel that is not as the format says");
+            continue;
+        };
         let property = match channel.target.path.as_str() {
             "translation" => Property::Translation,
             "rotation" => Property::Rotation,
@@ -112,13 +128,24 @@ fn convert(
             }
         };
         // A node that is not in the scene shown moves nothing there.
-        let Some(target) = channel.target.node.and_then(|node| entities.get(node).copied().flatten()) else {
-            continue;
+        let node = channel.target.node.and_then(|Whole(node)| entities.get(node as usize).copied().flatten());
+        let Some(target) = node else { continue };
+        let sampler = match json.samplers.get(channel.sampler.0 as usize) {
+            Some(Lenient::Good(sampler)) => sampler,
+            Some(Lenient::Bad(_)) => {
+                sink.ignored(document.file, &place, "channel whose sampler is not as the format says");
+                continue;
+            }
+            None => {
+                sink.ignored(document.file, &place, "channel whose sampler does not exist");
+                continue;
+            }
         };
-        let Some(sampler) = json.samplers.get(channel.sampler) else {
-            sink.ignored(document.file, &place, "channel whose sampler does not exist");
+        // The format forbids it; what it would show is anyone's guess.
+        if !moved.insert((target, property)) {
+            sink.ignored(document.file, &place, "channel that moves what another one of its animation moves");
             continue;
-        };
+        }
         let curve = match curve(document, sampler, property, &place) {
             Ok(curve) => curve,
             Err(why) => {
@@ -146,7 +173,7 @@ fn curve(
     property: Property,
     place: &str,
 ) -> Result<Curve, String> {
-    let open = |index| document.elements(&Index::new(index), place).map_err(|error| error.to_string());
+    let open = |Whole(index)| document.elements(&Index::new(index), place).map_err(|error| error.to_string());
     let (input, output) = (open(sampler.input)?, open(sampler.output)?);
     let interpolation = match sampler.interpolation.as_deref() {
         None | Some("LINEAR") => Interpolation::Linear,
@@ -166,6 +193,9 @@ fn curve(
     if input.width != 1 || keys == 0 || width == 0 || output.width != element || output.count != values {
         return Err("keyframes and values do not match".to_owned());
     }
+    let memory = 4 * (keys as u64 + (output.count * element) as u64);
+    let too_large = |_| "too large for the memory allowed (see --max-memory)".to_owned();
+    document.budget.take(memory, document.file, place).map_err(too_large)?;
     let times: Vec<f32> = (0..keys).map(|i| input.get_f32::<1>(i)[0]).collect();
     if !times.iter().all(|time| time.is_finite()) || times.windows(2).any(|pair| pair[0] > pair[1]) {
         return Err("times of keyframes do not ascend".to_owned());

@@ -3,7 +3,7 @@
 use super::Document;
 use crate::load::budget::Budget;
 use crate::load::error::{LoadError, ReadError};
-use crate::load::source::{Bytes, Folder, SCENE_LIMIT};
+use crate::load::source::{Bytes, Folder, IMAGE_LIMIT, SCENE_LIMIT};
 use gltf::json::{Index, Root, buffer::View};
 use std::borrow::Cow;
 
@@ -48,12 +48,31 @@ pub(super) fn read_uri(folder: &Folder, uri: &str, limit: u64) -> Result<Bytes, 
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data(data).map(Cow::Owned);
     }
+    if uri.trim().is_empty() {
+        return Err(ReadError::Data("has an empty URI: nothing says which file it is"));
+    }
     let decoded = percent_decoded(uri);
     let plain = String::from_utf8_lossy(&decoded);
     match folder.read(&plain, limit) {
         Err(ReadError::Missing) if plain != uri => folder.read(uri, limit),
         done => done,
     }
+}
+
+/// As [`read_uri`], and whether what it names was found only by its bare name beside the scene: exporters write the
+/// paths of the machine they ran on, or what a web server wants to know behind a question mark.
+pub(super) fn read_image(folder: &Folder, uri: &str) -> (Result<Bytes, ReadError>, bool) {
+    let why = match read_uri(folder, uri, IMAGE_LIMIT) {
+        Err(why @ (ReadError::Missing | ReadError::Outside | ReadError::Scheme(_))) => why,
+        done => return (done, false),
+    };
+    let decoded = percent_decoded(uri);
+    let plain = String::from_utf8_lossy(&decoded);
+    let path = plain.split(['?', '#']).next().unwrap_or_default();
+    let names = [Some(plain.as_ref()), Some(path).filter(|path| *path != plain && !path.is_empty())];
+    let found = names.into_iter().flatten().find_map(|name| folder.read_or_neighbour(name, IMAGE_LIMIT).ok());
+    let is_found = found.is_some();
+    (found.ok_or(why), is_found)
 }
 
 /// A URI short enough for a message.

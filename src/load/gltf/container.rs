@@ -1,6 +1,7 @@
 //! `.gltf` text or `.glb` container: which bytes are the JSON, which the binary data.
 
 use crate::load::error::LoadError;
+use crate::load::first_bytes::not_a_scene;
 
 /// The two parts of a file.
 pub(super) struct Container<'a> {
@@ -12,6 +13,9 @@ pub(super) struct Container<'a> {
 pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, LoadError> {
     if bytes.is_empty() {
         return Err(LoadError::broken(file, "content", "the file is empty, not JSON"));
+    }
+    if let Some(what) = not_a_scene(bytes) {
+        return Err(LoadError::broken(file, "content", format!("is {what}")));
     }
     if !bytes.starts_with(b"glTF") {
         return Ok(Container { json: bytes, binary: None });

@@ -4,7 +4,7 @@ use super::Document;
 use super::accessor::Elements;
 use crate::load::error::LoadError;
 use crate::load::geometry::Part;
-use crate::load::report::Sink;
+use crate::load::report::{Kind, Sink};
 use crate::scene::{Influences, Skin, Target, TriangleMesh};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, Vec3};
@@ -15,6 +15,9 @@ use gltf::json::validation::Checked;
 
 /// Sets of four joints that are read: `JOINTS_0` to `JOINTS_7`.
 const MOST_SETS: u32 = 8;
+
+/// Bytes of one joint of a vertex and its weight.
+const INFLUENCE_MEMORY: usize = size_of::<u16>() + size_of::<f32>();
 
 /// Who makes a mesh change shape.
 pub(super) struct Follower {
@@ -27,13 +30,19 @@ pub(super) struct Follower {
 }
 
 /// Default weights of a node's mesh: the node's own, else the mesh's.
-pub(super) fn weights_of(node: &json::Node, mesh: &json::Mesh) -> Vec<f32> {
+pub(super) fn weights_of(
+    document: &Document<'_>,
+    node: &json::Node,
+    mesh: &json::Mesh,
+    user: &str,
+) -> Result<Vec<f32>, LoadError> {
     let count = mesh.primitives.iter().map(|p| p.targets.as_ref().map_or(0, Vec::len)).max().unwrap_or(0);
     let given = node.weights.as_ref().or(mesh.weights.as_ref());
+    document.budget.take(8 * count as u64, document.file, user)?;
     let mut weights = given.cloned().unwrap_or_default();
     weights.resize(count, 0.0);
     weights.iter_mut().filter(|weight| !weight.is_finite()).for_each(|weight| *weight = 0.0);
-    weights
+    Ok(weights)
 }
 
 /// Joint entities with their inverse bind matrices.
@@ -57,6 +66,9 @@ pub(super) fn skin(
     {
         return Err(document.broken(&place, "inverse bind matrices of a wrong type or count"));
     }
+    // Each node that wears the skin has joints of its own.
+    let memory = skin.joints.len() * size_of::<(Option<Entity>, DAffine3)>();
+    document.budget.take(memory as u64, document.file, &format!("{user}, {place}"))?;
     let mut joints = Vec::with_capacity(skin.joints.len());
     for (i, joint) in skin.joints.iter().enumerate() {
         document.at(&document.root.nodes, joint, "node", &place)?;
@@ -76,13 +88,14 @@ pub(super) fn skin(
     Ok(Skin { joints, influences: Influences::default(), space })
 }
 
-/// Reads what binds the vertices of a primitive.
+/// Reads what binds the vertices of a primitive to so many joints.
 pub(super) fn influences(
     document: &Document<'_>,
     primitive: &Primitive,
-    vertices: &[u32],
-    count: usize,
+    (vertices, count): (&[u32], usize),
+    joint_count: usize,
     place: &str,
+    sink: &mut Sink<'_>,
 ) -> Result<Influences, LoadError> {
     let mut sets = Vec::new();
     for set in 0..MOST_SETS {
@@ -95,12 +108,27 @@ pub(super) fn influences(
             None => break,
         }
     }
+    if sets.is_empty() {
+        sink.ignored(
+            document.file,
+            place,
+            "skin, but no JOINTS_0 and WEIGHTS_0: it stays where it is modelled",
+        );
+    }
+    let memory = vertices.len() * 4 * sets.len() * INFLUENCE_MEMORY;
+    document.budget.take(memory as u64, document.file, place)?;
     let mut found = Influences { per_vertex: 4 * sets.len(), ..Influences::default() };
     for &vertex in vertices {
         for (joints, weights) in &sets {
             found.joints.extend(joints.get::<4>(vertex as usize).map(|joint| joint as u16));
             found.weights.extend(weights.get_f32::<4>(vertex as usize));
         }
+    }
+    let pairs = found.joints.iter().zip(&found.weights);
+    let lost = pairs.filter(|&(&joint, &weight)| weight > 0.0 && usize::from(joint) >= joint_count).count();
+    if lost > 0 {
+        let what = "vertices hang on joints that their skin does not have";
+        sink.remark(Kind::Ignored, document.file, place, what.to_owned(), lost);
     }
     Ok(found)
 }
@@ -120,6 +148,7 @@ pub(super) fn targets(
             let read = |index: &Option<Index<json::Accessor>>| -> Result<Vec<Vec3>, LoadError> {
                 let Some(index) = index else { return Ok(Vec::new()) };
                 let elements = attribute(document, index, 3, count, &place)?;
+                document.budget.take(size_of_val(vertices) as u64 * 3, document.file, &place)?;
                 Ok(vertices.iter().map(|&vertex| Vec3::from(elements.get_f32(vertex as usize))).collect())
             };
             Ok(Target { positions: read(&target.positions)?, normals: read(&target.normals)? })
@@ -144,10 +173,37 @@ fn attribute<'d>(
     Err(document.broken(&elements.place, problem))
 }
 
+/// Asks for what [`gather`] and what comes before it take: a part without normals beside others with them gets a vertex
+/// for each corner.
+pub(super) fn take_for(document: &Document<'_>, parts: &[Part], place: &str) -> Result<(), LoadError> {
+    let any_normals = parts.iter().any(|part| part.normals.is_some());
+    let vertices = |part: &Part| {
+        let corners = if any_normals && part.normals.is_none() { 3 * part.triangles.len() } else { 0 };
+        part.positions.len().max(corners)
+    };
+    let vertices: usize = parts.iter().map(vertices).sum();
+    take(document, vertices, most_of(parts), place)
+}
+
+fn take(
+    document: &Document<'_>,
+    vertices: usize,
+    [per_vertex, targets]: [usize; 2],
+    place: &str,
+) -> Result<(), LoadError> {
+    let each = per_vertex * INFLUENCE_MEMORY + targets * 2 * size_of::<Vec3>();
+    document.budget.take((vertices as u64).saturating_mul(each as u64), document.file, place)
+}
+
+/// The most joints of a vertex, and the most morph targets, that a part has.
+fn most_of(parts: &[Part]) -> [usize; 2] {
+    let joints = parts.iter().map(|part| part.influences.per_vertex).max().unwrap_or(0);
+    [joints, parts.iter().map(|part| part.targets.len()).max().unwrap_or(0)]
+}
+
 /// What the parts of a mesh have, one after the other as [`crate::load::geometry::merge`] lays them out.
 pub(super) fn gather(parts: &[Part]) -> (Influences, Vec<Target>) {
-    let per_vertex = parts.iter().map(|part| part.influences.per_vertex).max().unwrap_or(0);
-    let targets = parts.iter().map(|part| part.targets.len()).max().unwrap_or(0);
+    let [per_vertex, targets] = most_of(parts);
     let mut influences = Influences { per_vertex, ..Influences::default() };
     let mut gathered = vec![Target::default(); targets];
     let mut vertices = 0;
@@ -175,17 +231,20 @@ pub(super) fn gather(parts: &[Part]) -> (Influences, Vec<Target>) {
 /// Vertices that were split off after `gather` follow what their originals do: there were `count` of them when
 /// the corners were those of `triangles`.
 pub(super) fn follow_splits(
+    document: &Document<'_>,
     (influences, targets): &mut (Influences, Vec<Target>),
-    count: usize,
-    triangles: &[[u32; 3]],
+    (count, triangles): (usize, &[[u32; 3]]),
     mesh: &TriangleMesh,
-) {
+    place: &str,
+) -> Result<(), LoadError> {
     let mut originals: Vec<usize> = (0..mesh.positions.len()).collect();
     for (&now, &before) in mesh.triangles.iter().flatten().zip(triangles.iter().flatten()) {
         originals[now as usize] = before as usize;
     }
     if originals.len() > count {
+        take(document, originals.len(), [influences.per_vertex, targets.len()], place)?;
         *influences = influences.of(originals.iter().copied());
         targets.iter_mut().for_each(|target| *target = target.of(originals.iter().copied()));
     }
+    Ok(())
 }

@@ -31,37 +31,45 @@ struct Compression {
     attributes: BTreeMap<String, u32>,
 }
 
-/// For each accessor of a compressed primitive what it holds.
+/// For each accessor of a compressed primitive what it holds. Many primitives may name one view: it is decoded once.
 pub(super) fn decode_all(document: &Document<'_>) -> Result<HashMap<usize, Decoded>, LoadError> {
-    let primitives: Vec<(String, &Primitive)> = document
-        .root
-        .meshes
-        .iter()
-        .enumerate()
-        .flat_map(|(i, mesh)| {
-            let numbered = mesh.primitives.iter().enumerate();
-            numbered.map(move |(k, primitive)| (format!("mesh {i}, primitive {k}, Draco"), primitive))
-        })
-        .collect();
-    let decoded: Vec<_> = primitives
+    let mut views: BTreeMap<u32, Vec<Compressed<'_>>> = BTreeMap::new();
+    for (i, mesh) in document.root.meshes.iter().enumerate() {
+        for (k, primitive) in mesh.primitives.iter().enumerate() {
+            let others = primitive.extensions.as_ref().map(|extensions| &extensions.others);
+            let Some(json) = others.and_then(|others| others.get("KHR_draco_mesh_compression")) else {
+                continue;
+            };
+            let place = format!("mesh {i}, primitive {k}, Draco");
+            let compression = Compression::deserialize(json).map_err(|why| document.broken(&place, why))?;
+            let Compression { buffer_view, attributes } = compression;
+            views.entry(buffer_view).or_default().push(Compressed { place, primitive, attributes });
+        }
+    }
+    let views: Vec<_> = views.into_iter().collect();
+    let decoded: Vec<_> = views
         .par_iter()
-        .map(|(place, primitive)| decode(document, primitive, place))
+        .map(|(view, users)| decode(document, *view, users))
         .collect::<Result<_, LoadError>>()?;
     Ok(decoded.into_iter().flatten().collect())
 }
 
+/// A primitive that is compressed.
+struct Compressed<'a> {
+    place: String,
+    primitive: &'a Primitive,
+    attributes: BTreeMap<String, u32>,
+}
+
+/// What all users of a view want to know of it.
 fn decode(
     document: &Document<'_>,
-    primitive: &Primitive,
-    place: &str,
-) -> Result<Vec<(usize, Decoded)>, LoadError> {
-    let others = primitive.extensions.as_ref().map(|extensions| &extensions.others);
-    let Some(json) = others.and_then(|others| others.get("KHR_draco_mesh_compression")) else {
-        return Ok(Vec::new());
-    };
-    let broken = |problem: String| document.broken(place, problem);
-    let compression = Compression::deserialize(json).map_err(|error| broken(error.to_string()))?;
-    let (bytes, _) = document.view(&Index::new(compression.buffer_view), place)?;
+    view: u32,
+    users: &[Compressed<'_>],
+) -> Result<HashMap<usize, Decoded>, LoadError> {
+    let mut found = HashMap::new();
+    let Some(Compressed { place, .. }) = users.first() else { return Ok(found) };
+    let (bytes, _) = document.view(&Index::new(view), place)?;
     let mut limits = DecodeLimits::default();
     limits.max_decoded_bytes = document.budget.left() / 4;
     limits.max_points = limits.max_decoded_bytes / 12;
@@ -69,21 +77,29 @@ fn decode(
     let mut mesh = Mesh::new();
     MeshDecoder::new()
         .decode(&mut DecoderBuffer::new(bytes).with_limits(limits), &mut mesh)
-        .map_err(|error| broken(format!("damaged data: {error}")))?;
-    let count = mesh.num_points();
-    let mut found = Vec::new();
-    if let Some(index) = &primitive.indices {
-        let indices: Vec<u32> = mesh.faces().iter().flatten().map(|point| point.0).collect();
-        document.budget.take(indices.len() as u64 * 8, document.file, place)?;
-        let decoded = Decoded {
-            count: indices.len(),
-            bytes: indices.iter().flat_map(|index| index.to_le_bytes()).collect(),
-            kind: ComponentType::U32,
-            width: 1,
-        };
-        found.push((index.value(), decoded));
+        .map_err(|error| document.broken(place, format!("damaged data: {error}")))?;
+    for user in users {
+        unpack(document, user, &mesh, &mut found)?;
     }
-    for (name, &id) in &compression.attributes {
+    Ok(found)
+}
+
+/// Adds the accessors of a primitive that are not yet there.
+fn unpack(
+    document: &Document<'_>,
+    Compressed { place, primitive, attributes }: &Compressed<'_>,
+    mesh: &Mesh,
+    found: &mut HashMap<usize, Decoded>,
+) -> Result<(), LoadError> {
+    let count = mesh.num_points();
+    if let Some(index) = primitive.indices.as_ref().filter(|index| !found.contains_key(&index.value())) {
+        let count = 3 * mesh.num_faces();
+        document.budget.take(count as u64 * 8, document.file, place)?;
+        let indices = mesh.faces().iter().flatten();
+        let bytes = indices.flat_map(|point| point.0.to_le_bytes()).collect();
+        found.insert(index.value(), Decoded { bytes, count, kind: ComponentType::U32, width: 1 });
+    }
+    for (name, &id) in attributes {
         let semantic: Checked<Semantic> =
             serde_json::from_value(name.as_str().into()).unwrap_or(Checked::Invalid);
         let (Some(accessor), Some(attribute)) =
@@ -91,6 +107,9 @@ fn decode(
         else {
             continue;
         };
+        if found.contains_key(&accessor.value()) {
+            continue;
+        }
         let described = document.at(&document.root.accessors, accessor, "accessor", place)?;
         let width = usize::from(attribute.num_components());
         document.budget.take(8 * (count * width) as u64, document.file, place)?;
@@ -100,9 +119,9 @@ fn decode(
             values.iter_mut().for_each(|value| *value = (*value / most).max(-1.0));
         }
         let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        found.push((accessor.value(), Decoded { bytes, kind: ComponentType::F32, width, count }));
+        found.insert(accessor.value(), Decoded { bytes, kind: ComponentType::F32, width, count });
     }
-    Ok(found)
+    Ok(())
 }
 
 /// What a normalised integer is divided by.

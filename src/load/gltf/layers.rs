@@ -1,6 +1,5 @@
 //! Material extensions → [`Layers`].
 
-use super::Document;
 use super::texture::{Textures, Use};
 use crate::load::report::Sink;
 use crate::scene::{
@@ -197,7 +196,6 @@ fn body(volume: &Volume) -> Body {
 /// `KHR_materials_pbrSpecularGlossiness` as a dielectric of that reflectance: its diffuse colour is the base
 /// colour, and roughness is what glossiness lacks to 1.
 pub(super) fn of_specular_glossiness(
-    document: &Document<'_>,
     old: &json::extensions::material::PbrSpecularGlossiness,
     sets: [u32; 2],
     unit: &impl Fn(f32) -> f32,
@@ -214,7 +212,7 @@ pub(super) fn of_specular_glossiness(
         return (layers, 1.0 - glossiness, None);
     };
     layers.specular_color_texture = textures.get(info, Encoding::Srgb, sets, sink);
-    let roughness = textures.made(document, info, sets, sink, |[_, _, _, alpha]| {
+    let roughness = textures.made(info, glossiness, sets, sink, |[_, _, _, alpha]| {
         let rough = 1.0 - glossiness * f32::from(alpha) / 255.0;
         [255, (rough * 255.0).round() as u8, 255, 255]
     });

@@ -1,6 +1,7 @@
 //! glTF materials.
 
 use super::Document;
+use super::head;
 use super::layers::{self, Extensions};
 use super::texture::{Textures, uses};
 use crate::load::error::LoadError;
@@ -23,6 +24,8 @@ pub(super) struct Palette {
     default: Option<Entity>,
     /// Which `TEXCOORD_n` each material wants as first and as second set.
     pub(super) uv_sets: Vec<[u32; 2]>,
+    /// Which of them have textures.
+    pub(super) textured: Vec<bool>,
 }
 
 impl Palette {
@@ -43,14 +46,18 @@ pub(super) fn spawn_all(
 ) -> Result<Palette, LoadError> {
     if let Some(all) = overrides.all {
         let count = document.root.materials.len();
-        return Ok(Palette { materials: vec![all; count], default: Some(all), uv_sets: vec![[0; 2]; count] });
+        let (materials, uv_sets) = (vec![all; count], vec![[0; 2]; count]);
+        return Ok(Palette { materials, default: Some(all), uv_sets, textured: vec![false; count] });
     }
     let mut textures = Textures::new(document, sink)?;
-    let mut palette = Palette { materials: Vec::new(), default: None, uv_sets: Vec::new() };
+    let mut palette =
+        Palette { materials: Vec::new(), default: None, uv_sets: Vec::new(), textured: Vec::new() };
     for (i, material) in document.root.materials.iter().enumerate() {
         let name = material.name.clone().unwrap_or_else(|| format!("material {i}"));
         let sets = uv_sets(document, material, &name, sink);
         palette.uv_sets.push(sets);
+        palette.textured.push(!uses(material).is_empty());
+        head::tell_unsupported(document.file, material, sink);
         let entity = match overrides.replacement(&name) {
             Some(entity) => entity,
             None => {
@@ -114,8 +121,7 @@ fn convert(
         let [r, g, b, a] = old.diffuse_factor.0.map(unit);
         (base_color, opacity, metallic) = (Vec3::new(r, g, b), a, 0.0);
         (base_texture, rough_texture) = (old.diffuse_texture.as_ref(), None);
-        let (reflecting, rough, texture) =
-            layers::of_specular_glossiness(document, old, sets, &unit, textures, sink);
+        let (reflecting, rough, texture) = layers::of_specular_glossiness(old, sets, &unit, textures, sink);
         layers = Some(reflecting);
         (roughness, roughness_texture) = (rough, texture);
     }

@@ -65,6 +65,21 @@ impl Meshes {
                 None => palette.default_material(document.file, sink),
             };
             let uv_sets = worn.map_or([0; 2], |index| palette.uv_sets[index as usize]);
+            if worn.is_some_and(|index| palette.textured[index as usize]) {
+                let has =
+                    |set: u32| primitive.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set)));
+                if !has(0) && !uv_sets.into_iter().any(has) {
+                    let what = format!(
+                        "no TEXCOORD_{} for the textures of its material: one texel all over",
+                        uv_sets[0]
+                    );
+                    sink.ignored(document.file, &place, what);
+                }
+            }
+            if document.meshes.get(index.value()).is_some_and(|mesh| mesh.moves_more(i)) {
+                let what = "morph targets that move COLOR_0 or TEXCOORD_n: these stay as they are";
+                sink.ignored(document.file, &place, what);
+            }
             let Some(mut part) =
                 read_primitive(document, primitive, uv_sets, follower.as_ref(), &place, sink)?
             else {
@@ -85,6 +100,9 @@ impl Meshes {
                 u16::try_from(slot).map_err(|_| document.broken(&place, "more than 65536 materials"))?;
             parts.push(part);
         }
+        if follower.is_some() {
+            deform::take_for(document, &parts, &label)?;
+        }
         let parts = geometry::faceted_beside_smooth(parts);
         let mut bound = follower.map(|follower| (follower, deform::gather(&parts)));
         // What has no area now may have it in another shape.
@@ -95,7 +113,7 @@ impl Meshes {
         let unsplit = bound.is_some().then(|| (done.mesh.positions.len(), done.mesh.triangles.clone()));
         tangents::complete_for(&mut done.mesh, &materials, document.file, &label, sink);
         if let (Some((_, bonds)), Some((count, triangles))) = (&mut bound, unsplit) {
-            deform::follow_splits(bonds, count, &triangles, &done.mesh);
+            deform::follow_splits(document, bonds, (count, &triangles), &done.mesh, &label)?;
         }
         done.mended.tell(document.file, &label, sink);
         let name = mesh.name.clone().unwrap_or(label);
@@ -145,7 +163,9 @@ fn read_primitive(
         Ok(Some(elements))
     };
     let Some(positions) = attribute(Semantic::Positions, &[3])? else {
-        return Err(document.broken(place, "no POSITION: nothing says where its vertices are"));
+        // The specification, 3.7.2: whoever reads it should skip it.
+        sink.ignored(file, place, "no POSITION: nothing says where its vertices are");
+        return Ok(None);
     };
     let normals = attribute(Semantic::Normals, &[3])?;
     let texture_coordinates = |set: u32, sink: &mut Sink<'_>| {
@@ -192,8 +212,9 @@ fn read_primitive(
     if let Some(follower) = follower {
         let (used, count) = (&used.vertices, positions.count);
         part.targets = deform::targets(document, primitive, used, count, place)?;
-        if follower.skin.is_some() {
-            part.influences = deform::influences(document, primitive, used, count, place)?;
+        if let Some(skin) = &follower.skin {
+            let joints = skin.joints.len();
+            part.influences = deform::influences(document, primitive, (used, count), joints, place, sink)?;
         }
     }
     Ok(Some(part))

@@ -15,12 +15,15 @@ mod buffer;
 mod container;
 mod deform;
 mod draco;
+mod head;
 mod layers;
 mod light;
 mod material;
 mod mesh;
 mod meshopt;
 mod node;
+mod parse;
+mod place;
 mod texture;
 mod vertices;
 
@@ -33,39 +36,9 @@ use animation::AnimationJson;
 use bevy_ecs::prelude::*;
 use gltf::json::mesh::Primitive;
 use gltf::json::{Index, Root};
-use serde::Deserialize;
+use parse::{Lenient, MeshMore, Placement};
 use std::collections::HashMap;
 use std::sync::Arc;
-
-/// Extensions that are honoured wholly or closely enough to accept a file that requires them.
-const SUPPORTED: &[&str] = &[
-    "EXT_mesh_features",
-    "EXT_mesh_gpu_instancing",
-    "EXT_meshopt_compression",
-    "EXT_structural_metadata",
-    "EXT_texture_webp",
-    "FB_ngon_encoding",
-    "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_meshopt_compression",
-    "KHR_node_visibility",
-    "KHR_texture_basisu",
-    "KHR_texture_transform",
-    "KHR_xmp_json_ld",
-    "MSFT_lod",
-];
 
 /// Reads `bytes` and spawns the default scene below `root`.
 pub(super) fn load(
@@ -78,9 +51,9 @@ pub(super) fn load(
 ) -> Result<(), LoadError> {
     sink.begin(Phase::Parsing);
     let container = container::split(file, &bytes)?;
-    let json = without_bom(container.json);
-    check_head(file, json, sink)?;
-    let (tree, more) = parse_tree(file, json)?;
+    let json = parse::as_utf8(file, without_bom(container.json), sink)?;
+    head::check(file, &json, sink)?;
+    let (tree, more) = parse::parse_tree(file, &json, &sink.budget)?;
     sink.begin(Phase::Reading);
     let buffers = buffer::read_all(&tree, folder, container.binary, &sink.budget);
     let mut document = Document {
@@ -88,6 +61,7 @@ pub(super) fn load(
         folder,
         root: tree,
         placements: more.nodes,
+        meshes: more.meshes,
         animations: more.animations,
         variant: None,
         unpacked: Vec::new(),
@@ -112,7 +86,8 @@ struct Document<'a> {
     folder: &'a Folder,
     root: Root,
     placements: Vec<Placement>,
-    animations: Vec<AnimationJson>,
+    meshes: Vec<MeshMore>,
+    animations: Lenient<Vec<Lenient<AnimationJson>>>,
     /// Which of `KHR_materials_variants` is worn.
     variant: Option<u32>,
     buffers: Vec<buffer::Buffer<'a>>,
@@ -191,139 +166,5 @@ impl Document<'_> {
         list.get(index.value()).ok_or_else(|| {
             self.broken(user, format!("index out of range: names {kind} {} of {}", index.value(), list.len()))
         })
-    }
-}
-
-/// What is read a second time: where nodes stand, in double precision (`gltf::json` keeps only single),
-/// and animations.
-#[derive(Deserialize)]
-struct More {
-    #[serde(default)]
-    nodes: Vec<Placement>,
-    #[serde(default)]
-    animations: Vec<AnimationJson>,
-}
-
-/// Placement of one node; see the glTF specification, section 3.5.3.
-#[derive(Default, Deserialize)]
-struct Placement {
-    matrix: Option<[f64; 16]>,
-    translation: Option<[f64; 3]>,
-    rotation: Option<[f64; 4]>,
-    scale: Option<[f64; 3]>,
-}
-
-/// What must be known before the rest can be parsed.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Head {
-    asset: Option<HeadAsset>,
-    #[serde(default)]
-    extensions_required: Vec<String>,
-    #[serde(default)]
-    extensions_used: Vec<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct HeadAsset {
-    /// A string, in files of version 1 also a number.
-    version: Option<serde_json::Value>,
-    min_version: Option<serde_json::Value>,
-}
-
-fn parse<'a, T: Deserialize<'a>>(file: &str, json: &'a [u8]) -> Result<T, LoadError> {
-    serde_json::from_slice(json).map_err(|error| {
-        let text = error.to_string();
-        let reason = text.split(" at line ").next().unwrap_or_default();
-        let place = format!("line {} column {}", error.line(), error.column());
-        LoadError::broken(file, place, format!("not valid glTF JSON: {reason}"))
-    })
-}
-
-/// The whole tree, and what is read a second time; once more where that fails without what `gltf::json` knows less of
-/// than the format (animations, of which it has only those of nodes; scenes, to which it denies being empty; whole
-/// numbers that some write as `4.0`).
-fn parse_tree(file: &str, json: &[u8]) -> Result<(Root, More), LoadError> {
-    let (tree, more) = match (parse(file, json), parse(file, json)) {
-        (Ok(tree), Ok(more)) => return Ok((tree, more)),
-        either => either,
-    };
-    let mut value: serde_json::Value = parse(file, json)?;
-    write_without_point(&mut value);
-    let more = more.or_else(|why| serde_json::from_value(value.clone()).map_err(|_| why))?;
-    if let Some(root) = value.as_object_mut() {
-        root.remove("animations");
-        let scenes = root.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
-        for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
-            scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
-        }
-    }
-    let tree = tree.or_else(|why| serde_json::from_value(value).map_err(|_| why))?;
-    Ok((tree, more))
-}
-
-/// Makes whole numbers of those that are written as `4.0`, to all depths (`serde_json` allows 128).
-fn write_without_point(value: &mut serde_json::Value) {
-    match value {
-        serde_json::Value::Number(number) => {
-            // Up to here all whole numbers are different numbers in double precision.
-            let whole =
-                number.as_f64().filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 2_f64.powi(53));
-            if let Some(whole) = whole {
-                *number = (whole as i64).into();
-            }
-        }
-        serde_json::Value::Array(items) => items.iter_mut().for_each(write_without_point),
-        serde_json::Value::Object(members) => members.values_mut().for_each(write_without_point),
-        _ => {}
-    }
-}
-
-/// Refuses other versions and required extensions; warns of extensions that are merely used.
-fn check_head(file: &str, json: &[u8], sink: &mut Sink<'_>) -> Result<(), LoadError> {
-    if json.iter().all(u8::is_ascii_whitespace) {
-        return Err(LoadError::broken(file, "content", "the JSON is empty"));
-    }
-    let head: Head = parse(file, json)?;
-    let version = |value: Option<serde_json::Value>| match value {
-        Some(serde_json::Value::String(text)) => text,
-        Some(other) => other.to_string(),
-        None => "missing".to_owned(),
-    };
-    let Some(asset) = head.asset else {
-        return Err(LoadError::broken(file, "asset", "not a glTF file: no `asset` with a version"));
-    };
-    let asked = version(asset.min_version.clone().or(asset.version));
-    if asked.is_empty() {
-        return Err(LoadError::broken(file, "asset", "the version is empty; Penumbra reads glTF 2.0"));
-    }
-    if !asked.starts_with("2.") || (asset.min_version.is_some() && asked != "2.0") {
-        let problem = format!("glTF version {asked}; Penumbra reads 2.0: export it again as glTF 2.0");
-        return Err(LoadError::broken(file, "asset", problem));
-    }
-    for extension in &head.extensions_required {
-        if !SUPPORTED.contains(&extension.as_str()) {
-            return Err(LoadError::Extension {
-                file: file.to_owned(),
-                extension: extension.clone(),
-                way_out: way_out(extension),
-            });
-        }
-    }
-    let ignored: Vec<&str> =
-        head.extensions_used.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect();
-    if !ignored.is_empty() {
-        for name in ignored {
-            sink.ignored(file, "", format!("extension {name} is not supported"));
-        }
-    }
-    Ok(())
-}
-
-fn way_out(extension: &str) -> &'static str {
-    match extension {
-        "EXT_texture_avif" | "MSFT_texture_dds" => "export it again with PNG, JPEG or WebP textures",
-        _ => "export it again without that extension",
     }
 }

@@ -2,18 +2,16 @@
 
 use super::deform::{self, Follower};
 use super::material::Palette;
-use super::mesh::{Built, Meshes};
-use super::{Document, Placement, animation, light};
+use super::mesh::Meshes;
+use super::place::{MOST_NODES, instantiate, place, placement};
+use super::{Document, animation, light};
 use crate::load::error::LoadError;
-use crate::load::report::Sink;
-use crate::scene::{Instance, MorphWeights, Transform};
+use crate::load::report::{Kind, Sink};
+use crate::scene::{MorphWeights, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use glam::{DAffine3, DMat4, DQuat, DVec3};
-use gltf::json::{self, Index};
-
-/// Most nodes and instances of one file together.
-const MOST_NODES: usize = 1 << 22;
+use glam::DAffine3;
+use gltf::json::Index;
 
 /// Spawns the default scene (else the first, else all root nodes) below `root`.
 pub(super) fn spawn_scene(
@@ -32,6 +30,8 @@ pub(super) fn spawn_scene(
         (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
     let order = top_down(document, &roots);
     let hidden = hidden(document, &order, &parents, sink);
+    let mut flat: Vec<bool> = local.iter().map(|local| local.matrix3.determinant() == 0.0).collect();
+    order.iter().for_each(|&i| flat[i] |= parents[i].is_some_and(|parent| flat[parent]));
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
     if nodes.is_empty() && !document.root.meshes.is_empty() {
@@ -67,9 +67,13 @@ pub(super) fn spawn_scene(
         let (node, user) = (&nodes[i], format!("node {i}"));
         let (Some(index), Some(entity), false) = (&node.mesh, entities[i], hidden[i]) else { continue };
         let mesh = document.at(&document.root.meshes, index, "mesh", &user)?;
-        let weights = deform::weights_of(node, mesh);
+        if flat[i] && node.skin.is_none() {
+            let what = "scaled to nothing: its mesh is flat, or not to be seen";
+            sink.remark(Kind::Approximated, document.file, &user, what.to_owned(), 1);
+        }
+        let weights = deform::weights_of(document, node, mesh, &user)?;
         let morphs = weights.iter().any(|&weight| weight != 0.0)
-            || (!weights.is_empty() && !document.animations.is_empty());
+            || (!weights.is_empty() && document.animations.good().is_some_and(|all| !all.is_empty()));
         // The format: the transform of a skinned mesh's own node does not count.
         let holder = node.skin.as_ref().map(|_| {
             sink.spawn((Name::new(format!("{user} (skinned)")), Transform::default(), ChildOf(root)))
@@ -89,96 +93,6 @@ pub(super) fn spawn_scene(
         }
     }
     animation::spawn_all(document, &entities, sink)
-}
-
-/// Puts the mesh on its node, or once at each place that `EXT_mesh_gpu_instancing` lists.
-fn place(
-    document: &Document<'_>,
-    node: &json::Node,
-    entity: Entity,
-    built: &Built,
-    user: &str,
-    sink: &mut Sink<'_>,
-) -> Result<(), LoadError> {
-    let others = node.extensions.as_ref().map(|extensions| &extensions.others);
-    let Some(lists) = others.and_then(|others| others.get("EXT_mesh_gpu_instancing")?.get("attributes"))
-    else {
-        instantiate(built, entity, sink);
-        return Ok(());
-    };
-    let open = |name: &str, width: usize| {
-        let index = lists.get(name).and_then(serde_json::Value::as_u64).and_then(|i| u32::try_from(i).ok());
-        let Some(index) = index else { return Ok(None) };
-        let elements = document.elements(&Index::new(index), &format!("{user}, instances {name}"))?;
-        if elements.width == width {
-            Ok(Some(elements))
-        } else {
-            Err(document.broken(user, format!("instances: {name} of a wrong type")))
-        }
-    };
-    let (translation, rotation, scale) = (open("TRANSLATION", 3)?, open("ROTATION", 4)?, open("SCALE", 3)?);
-    let counts = || [&translation, &rotation, &scale].into_iter().flatten().map(|elements| elements.count);
-    let count = counts().max().unwrap_or(0);
-    if counts().any(|other| other != count) || sink.spawned().len() + count > MOST_NODES {
-        return Err(document.broken(user, "instances: lists of unequal or too large count"));
-    }
-    for i in 0..count {
-        let parts = Placement {
-            matrix: None,
-            translation: translation.as_ref().map(|elements| elements.get(i)),
-            rotation: rotation.as_ref().map(|elements| elements.get(i)),
-            scale: scale.as_ref().map(|elements| elements.get(i)),
-        };
-        let name = Name::new(format!("instance {i}"));
-        let copy = sink.spawn((name, Transform(parts.affine().0), ChildOf(entity)));
-        instantiate(built, copy, sink);
-    }
-    Ok(())
-}
-
-fn instantiate(built: &Built, entity: Entity, sink: &mut Sink<'_>) {
-    sink.report.triangles += built.triangles;
-    if let Some(mesh) = built.entity {
-        sink.world.entity_mut(entity).insert(Instance { mesh, materials: built.materials.clone() });
-    }
-}
-
-impl Placement {
-    /// `parent_from_node`, and whether it had to be mended.
-    fn affine(&self) -> (DAffine3, bool) {
-        if let Some(matrix) = self.matrix {
-            let matrix = DMat4::from_cols_array(&matrix);
-            let is_affine = matrix.row(3) == glam::DVec4::W;
-            return (DAffine3::from_mat4(matrix), !is_affine);
-        }
-        let [x, y, z, w] = self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
-        let stored = DQuat::from_xyzw(x, y, z, w);
-        let length = stored.length();
-        let rotation = if length > 0.0 && length.is_finite() { stored / length } else { DQuat::IDENTITY };
-        let translation = self.translation.map_or(DVec3::ZERO, DVec3::from);
-        let scale = self.scale.map_or(DVec3::ONE, DVec3::from);
-        let affine = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
-        (affine, (length - 1.0).abs() > 1e-2 || !length.is_finite())
-    }
-}
-
-fn placement(document: &Document<'_>, i: usize, sink: &mut Sink<'_>) -> Result<DAffine3, LoadError> {
-    let Some(placement) = document.placements.get(i) else {
-        return Ok(DAffine3::IDENTITY);
-    };
-    let (affine, mended) = placement.affine();
-    if !affine.is_finite() {
-        return Err(document.broken(format!("node {i}"), "its transform is not finite"));
-    }
-    if mended {
-        let what = if placement.matrix.is_some() {
-            "matrix is not affine: its last row is ignored"
-        } else {
-            "rotation is not a unit quaternion: normalised"
-        };
-        sink.repaired(document.file, &format!("node {i}"), what);
-    }
-    Ok(affine)
 }
 
 /// Parent of each node; refuses children that do not exist, second parents and cycles.

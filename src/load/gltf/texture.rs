@@ -5,7 +5,6 @@ use super::{Document, buffer};
 use crate::load::error::{LoadError, ReadError};
 use crate::load::picture::{self, Picture};
 use crate::load::report::Sink;
-use crate::load::source::IMAGE_LIMIT;
 use crate::scene::{Encoding, Filter, Texels, Texture, TextureUse, Wrap};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
@@ -70,6 +69,8 @@ pub(super) struct Textures<'a> {
     document: &'a Document<'a>,
     images: BTreeMap<usize, Arc<Texels>>,
     spawned: BTreeMap<(usize, bool), Entity>,
+    /// By texture and factor: what [`Textures::made`] made.
+    made: BTreeMap<(usize, u32), Entity>,
 }
 
 impl<'a> Textures<'a> {
@@ -87,13 +88,14 @@ impl<'a> Textures<'a> {
                 };
                 let user = format!("texture {}", used.index.value());
                 let image = document.at(&root.images, &Index::new(source as u32), "image", &user)?;
-                wanted.entry(source).or_insert_with(|| picture_of(document, source, image));
+                wanted.entry(source).or_insert_with(|| picture_of(document, source, image, sink));
             }
         }
         let (indices, pictures): (Vec<usize>, Vec<Picture<'_>>) = wanted.into_iter().unzip();
         let decoded = picture::decode_all(document.file, &pictures, sink).into_iter();
         let texels: Vec<_> = decoded.map(|texels| texels.unwrap_or_else(picture::stand_in)).collect();
-        Ok(Self { document, images: indices.into_iter().zip(texels).collect(), spawned: BTreeMap::new() })
+        let images = indices.into_iter().zip(texels).collect();
+        Ok(Self { document, images, spawned: BTreeMap::new(), made: BTreeMap::new() })
     }
 
     /// The texture of `used` by a mesh whose sets of texture coordinates are `sets`.
@@ -122,22 +124,35 @@ impl<'a> Textures<'a> {
 }
 
 impl Textures<'_> {
-    /// A texture whose texels are made from those of `info`, as data.
+    /// A texture whose texels are made from those of `info` and a factor, as data; materials that agree share it.
     pub(super) fn made(
         &mut self,
-        document: &Document<'_>,
         info: &Info,
+        factor: f32,
         sets: [u32; 2],
         sink: &mut Sink<'_>,
         texel: impl Fn([u8; 4]) -> [u8; 4],
     ) -> Option<TextureUse> {
         let given = self.get(info, Encoding::Linear, sets, sink)?;
+        let key = (info.index.value(), factor.to_bits());
+        if let Some(&texture) = self.made.get(&key) {
+            return Some(TextureUse { texture, ..given });
+        }
+        let file = self.document.file;
         let Texture { texels, wrap, filter, .. } = sink.world.get::<Texture>(given.texture)?.clone();
+        let place = format!("texture {}", info.index.value());
+        if sink.budget.take(size_of_val(&*texels.texels) as u64, file, &place).is_err() {
+            let what = "its roughness is left out: too large for the memory allowed (see --max-memory)";
+            sink.ignored(file, &place, what);
+            return None;
+        }
         let made = texels.texels.iter().map(|&given| texel(given)).collect();
         let texels = Arc::new(Texels { width: texels.width, height: texels.height, texels: made });
-        let name = format!("{}: roughness", document.file);
-        let texture = Texture { texels, encoding: Encoding::Linear, wrap, filter };
-        Some(TextureUse { texture: sink.spawn((Name::new(name), texture)), ..given })
+        let name = format!("{file}: roughness");
+        let texture =
+            sink.spawn((Name::new(name), Texture { texels, encoding: Encoding::Linear, wrap, filter }));
+        self.made.insert(key, texture);
+        Some(TextureUse { texture, ..given })
     }
 }
 
@@ -152,12 +167,22 @@ fn source_of(texture: &json::Texture) -> Option<usize> {
     extension("EXT_texture_webp").or(core).or_else(|| extension("KHR_texture_basisu"))
 }
 
-fn picture_of<'d>(document: &'d Document<'_>, index: usize, image: &json::Image) -> Picture<'d> {
+fn picture_of<'d>(
+    document: &'d Document<'_>,
+    index: usize,
+    image: &json::Image,
+    sink: &mut Sink<'_>,
+) -> Picture<'d> {
     let mut label = format!("image {index}");
     let bytes = match (&image.uri, &image.buffer_view) {
         (Some(uri), _) => {
             label = format!("image {index} ({})", buffer::shorten(uri));
-            buffer::read_uri(document.folder, uri, IMAGE_LIMIT)
+            let (bytes, elsewhere) = buffer::read_image(document.folder, uri);
+            if elsewhere {
+                let what = "is not where the file says: the one of that name beside the scene instead";
+                sink.repaired(document.file, &label, what);
+            }
+            bytes
         }
         (None, Some(view)) => document
             .view(view, &label)
