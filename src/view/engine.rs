@@ -149,6 +149,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                     }
                     app = other;
                     prepare(&mut app, &self.interrupt);
+                    view_changed_at = Instant::now();
                 }
                 // Also if it could not be: what was missing may come.
                 files = self.watch(&app);
