@@ -24,6 +24,8 @@ pub struct Line {
     pub alpha: f32,
 }
 
+/// How dark it is around a line, compared with how opaque that is.
+const SHADE: f32 = 0.5;
 /// How opaque a line is behind surfaces, compared with before them.
 const HIDDEN: f32 = 0.16;
 /// A line that lies in a surface is before it: by this part of its depth.
@@ -106,6 +108,31 @@ impl Layer {
         }
     }
 
+    /// Darkens what is around the lines, so that light ones are seen on light walls.
+    pub fn shade_around(&mut self) {
+        let width = self.size.x as usize;
+        let alphas: Vec<u8> = self.rgba.iter().map(|pixel| pixel[3]).collect();
+        let rows: Vec<&[u8]> = alphas.chunks_exact(width.max(1)).collect();
+        for (y, line) in self.rgba.chunks_exact_mut(width.max(1)).enumerate() {
+            let near = &rows[y.saturating_sub(1)..(y + 2).min(rows.len())];
+            // Most of a picture has no lines.
+            if near.iter().all(|row| row.iter().all(|&alpha| alpha == 0)) {
+                continue;
+            }
+            for (x, pixel) in line.iter_mut().enumerate() {
+                let columns = x.saturating_sub(1)..(x + 2).min(width);
+                let most = near.iter().flat_map(|row| &row[columns.clone()]).copied().max().unwrap_or(0);
+                let (own, shade) = (f32::from(pixel[3]) / 255.0, SHADE * f32::from(most) / 255.0);
+                let sum = own + shade * (1.0 - own);
+                if sum > own {
+                    let [r, g, b] =
+                        [pixel[0], pixel[1], pixel[2]].map(|c| (f32::from(c) * own / sum + 0.5) as u8);
+                    *pixel = [r, g, b, (sum * 255.0 + 0.5) as u8];
+                }
+            }
+        }
+    }
+
     /// Puts a colour over what is there.
     fn blend(&mut self, index: usize, color: [u8; 3], alpha: f32) {
         let old = self.rgba[index];
@@ -154,6 +181,26 @@ mod tests {
         assert!(drawn > 60.0, "{drawn} of 101");
         let pixels = layer.rgba.iter().filter(|p| p[3] > 0).count();
         assert!(pixels < 40, "a line, no plane: {pixels}");
+    }
+
+    #[test]
+    fn around_a_line_it_is_darker_and_nowhere_else() {
+        let mut layer = Layer::new(SIZE);
+        let ends = [Vec3::new(-0.3, 0.0, -2.0), Vec3::new(0.3, 0.0, -2.0)];
+        layer.draw(&[Line { color: [255; 3], ..line(ends[0], ends[1]) }], &Viewpoint::default(), None);
+        let before = layer.clone();
+        layer.shade_around();
+        let mut white = vec![255; SIZE.element_product() as usize * 4];
+        layer.cover(&mut white);
+        assert!(white.iter().any(|&c| c < 150), "seen on white");
+        let width = SIZE.x as usize;
+        for (i, pixel) in layer.rgba.iter().enumerate() {
+            let rows = [i.wrapping_sub(width), i, i + width];
+            let near = rows.into_iter().flat_map(|i| [i.wrapping_sub(1), i, i + 1]);
+            let has_line = near.filter_map(|i| before.rgba.get(i)).any(|pixel| pixel[3] > 0);
+            assert_eq!(pixel[3] > 0, has_line, "{i}");
+            assert!(pixel[3] >= before.rgba[i][3]);
+        }
     }
 
     #[test]

@@ -319,6 +319,7 @@ pub fn draw_layer(
     let mut made = Layer::new(size);
     made.draw(&lines.0, &viewpoint, surfaces.map(crate::trace::first::Grid::cells));
     made.draw(&marks.lines(&viewpoint, size), &viewpoint, None);
+    made.shade_around();
     layer.0 = Some(Arc::new(made));
 }
 
