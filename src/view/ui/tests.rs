@@ -88,7 +88,7 @@ fn every_page_of_the_help_is_inside_the_window() {
     let (keys, letters) = (Keymap::default(), Letters::default());
     let content = content(None, "", &keys, &letters);
     for (width, height, most) in
-        [(1920, 1080, 1), (960, 540, 2), (640, 400, 4), (320, 240, 12), (200, 600, 12)]
+        [(1920, 1080, 1), (960, 540, 1), (700, 450, 2), (640, 400, 3), (320, 240, 6), (200, 600, 12)]
     {
         let mut ui = Ui { level: Level::None, ..Ui::default() };
         let mut pages = 0;
