@@ -25,7 +25,7 @@ pub struct Line {
 }
 
 /// How dark it is around a line, compared with how opaque that is.
-const SHADE: f32 = 0.5;
+const SHADE: f32 = 0.7;
 /// How opaque a line is behind surfaces, compared with before them.
 const HIDDEN: f32 = 0.16;
 /// A line that lies in a surface is before it: by this part of its depth.
@@ -192,7 +192,7 @@ mod tests {
         layer.shade_around();
         let mut white = vec![255; SIZE.element_product() as usize * 4];
         layer.cover(&mut white);
-        assert!(white.iter().any(|&c| c < 150), "seen on white");
+        assert!(white.iter().any(|&c| c < 180), "seen on white");
         let width = SIZE.x as usize;
         for (i, pixel) in layer.rgba.iter().enumerate() {
             let rows = [i.wrapping_sub(width), i, i + width];

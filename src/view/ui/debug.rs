@@ -8,7 +8,7 @@ use super::style::{ACCENT, FAINT, MARGIN};
 use super::touchable_card;
 use crate::bvh::inspect::{Order, Visited, Visits};
 use crate::trace::explain::{Kind, LightRow};
-use egui::{Align2, Color32, Context, Grid, Rect, RichText, ScrollArea, Ui, vec2};
+use egui::{Align2, Color32, Context, Frame, Grid, Margin, Rect, RichText, ScrollArea, Ui, vec2};
 use glam::UVec2;
 
 /// Nobody scrolls through more lines.
@@ -100,7 +100,9 @@ fn show_pixel(ui: &mut Ui, told: &Told, status: &DebugStatus, height: f32) {
         faint(ui, if told.hit.is_none() { "hits nothing" } else { "no light was sampled" });
     } else {
         let lights = ScrollArea::vertical().min_scrolled_height(LIGHTS[0]).max_height(height);
-        lights.show(ui, |ui| show_lights(ui, &explanation.lights));
+        // The bar that tells where one is stands to the right of the numbers.
+        let margin = Frame::new().inner_margin(Margin { right: 8, ..Margin::ZERO });
+        lights.show(ui, |ui| margin.show(ui, |ui| show_lights(ui, &explanation.lights)));
     }
     let [stack, queue] = told.visits;
     for (name, visits, order) in [("near first", stack, Order::NearFirst), ("queue", queue, Order::Queue)] {
@@ -131,7 +133,8 @@ fn cost_line(name: &str, visits: &Visits) -> String {
 }
 
 fn show_lights(ui: &mut Ui, rows: &[LightRow]) {
-    Grid::new("lights").num_columns(7).spacing([10.0, 2.0]).show(ui, |ui| {
+    let grid = Grid::new("lights").num_columns(7).spacing([10.0, 2.0]).min_row_height(0.0);
+    grid.show(ui, |ui| {
         for title in ["light", "lit / sampled", "density, 1/sr", "unblocked", "brings", "nodes", "triangles"]
         {
             faint(ui, title);
