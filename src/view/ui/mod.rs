@@ -160,7 +160,8 @@ impl Ui {
             });
         }
         self.help.show(context, content.keys, content.letters);
-        if !content.notice.is_empty() {
+        // What is read is not to be covered; the notice is still there when it is closed.
+        if !content.notice.is_empty() && !reads {
             let at = |anchor, y| (anchor, vec2(0.0, y));
             let width = places.size_of(context, "notice").x;
             let (left, right) = (places.room.center().x - 0.5 * width, places.room.center().x + 0.5 * width);
@@ -168,7 +169,8 @@ impl Ui {
             let below = at(Align2::CENTER_TOP, places.reach(left, right, true));
             let bottom = at(Align2::CENTER_BOTTOM, -MARGIN);
             let place = places.find(context, "notice", &[bottom, above, below]);
-            card(context, "notice", place, |ui| {
+            let area = Area::new(Id::new("notice")).interactable(false).order(egui::Order::Foreground);
+            show_card(context, area, place, |ui| {
                 ui.set_max_width(places.room.width() - 6.0 * MARGIN);
                 ui.label(content.notice);
             });
@@ -188,17 +190,22 @@ impl Ui {
             places.take(legend::show(context, legend));
         }
         if let Some((name, part)) = content.compared {
+            let middle = places.room.center().x;
+            let half = 0.5 * places.size_of(context, "compared").x;
+            let most = (0.5 * places.room.width() - half - MARGIN).max(0.0);
+            // Where both meet.
+            let beside = if part < 1.0 { (part as f32 - 0.5) * places.room.width() } else { 0.0 };
+            let beside = beside.clamp(-most, most);
             // Below the status, also where that is as wide as the window.
-            let (left, right) = (places.room.center().x - 60.0, places.room.center().x + 60.0);
-            let place = (Align2::CENTER_TOP, vec2(0.0, places.reach(left, right, true)));
+            let down = places.reach(middle + beside - half, middle + beside + half, true);
+            let place = (Align2::CENTER_TOP, vec2(beside, down));
             places.take(card(context, "compared", place, |ui| {
                 ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
                 let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
                 ui.label(RichText::new(text).color(ACCENT));
             }));
         }
-        let explained = debug::show(context, &status.debug, status.size, places);
-        if let Some(card) = explained.filter(|_| places.is_roomy()) {
+        if let Some(card) = debug::show(context, &status.debug, status.size, places) {
             places.take(card);
         }
         let has_room = places.is_roomy() && edit::height(places) >= FEWEST_NUMBERS;
