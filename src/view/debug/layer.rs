@@ -110,24 +110,22 @@ impl Layer {
 
     /// Darkens what is around the lines, so that light ones are seen on light walls.
     pub fn shade_around(&mut self) {
-        let width = self.size.x as usize;
-        let alphas: Vec<u8> = self.rgba.iter().map(|pixel| pixel[3]).collect();
-        let rows: Vec<&[u8]> = alphas.chunks_exact(width.max(1)).collect();
-        for (y, line) in self.rgba.chunks_exact_mut(width.max(1)).enumerate() {
-            let near = &rows[y.saturating_sub(1)..(y + 2).min(rows.len())];
-            // Most of a picture has no lines.
-            if near.iter().all(|row| row.iter().all(|&alpha| alpha == 0)) {
-                continue;
-            }
+        let width = (self.size.x as usize).max(1);
+        // The most opaque of each pixel and those beside it, then of that above and below.
+        let mut beside = Vec::with_capacity(self.rgba.len());
+        for row in self.rgba.chunks_exact(width) {
+            let most =
+                |x: usize| row[x.saturating_sub(1)..(x + 2).min(width)].iter().map(|pixel| pixel[3]).max();
+            beside.extend((0..width).map(|x| most(x).unwrap_or(0)));
+        }
+        let rows: Vec<&[u8]> = beside.chunks_exact(width).collect();
+        for (y, line) in self.rgba.chunks_exact_mut(width).enumerate() {
+            let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(rows.len() - 1)].map(|y| rows[y]);
             for (x, pixel) in line.iter_mut().enumerate() {
-                let columns = x.saturating_sub(1)..(x + 2).min(width);
-                let most = near.iter().flat_map(|row| &row[columns.clone()]).copied().max().unwrap_or(0);
-                let (own, shade) = (f32::from(pixel[3]) / 255.0, SHADE * f32::from(most) / 255.0);
-                let sum = own + shade * (1.0 - own);
-                if sum > own {
-                    let [r, g, b] =
-                        [pixel[0], pixel[1], pixel[2]].map(|c| (f32::from(c) * own / sum + 0.5) as u8);
-                    *pixel = [r, g, b, (sum * 255.0 + 0.5) as u8];
+                let most = above[x].max(here[x]).max(below[x]);
+                // Most of a picture has no lines.
+                if most > 0 {
+                    *pixel = over_shade(*pixel, SHADE * f32::from(most) / 255.0);
                 }
             }
         }
@@ -154,6 +152,14 @@ impl Layer {
             }
         }
     }
+}
+
+/// A colour over so much black.
+fn over_shade([r, g, b, own]: [u8; 4], shade: f32) -> [u8; 4] {
+    let own = f32::from(own) / 255.0;
+    let sum = own + shade * (1.0 - own);
+    let mix = |c: u8| (f32::from(c) * own / sum + 0.5) as u8;
+    [mix(r), mix(g), mix(b), (sum * 255.0 + 0.5) as u8]
 }
 
 #[cfg(test)]
