@@ -97,6 +97,8 @@ pub struct FrameStats {
     pub rays: RayCounts,
     /// Seconds spent tracing since the world was made.
     pub trace_seconds: f64,
+    /// Those of them that the last frame spent.
+    pub frame_seconds: f64,
     /// Rays of all kinds per second of tracing time, lately.
     pub rays_per_second: f64,
     /// Side of a preview pixel, if the picture is still partly a preview.
@@ -248,7 +250,7 @@ pub fn trace_frame(
     mut preview: ResMut<Preview>,
     mut stats: ResMut<FrameStats>,
     redone: Res<Redone>,
-    mut previewed: Local<u64>,
+    mut last: Local<(u64, bool)>,
     mut estimated: Local<Estimated>,
 ) {
     let scene = inputs.scene();
@@ -264,8 +266,10 @@ pub fn trace_frame(
         estimated.at = f64::NEG_INFINITY;
     }
     let mut rays = RayCounts::default();
-    // Once for each reset: a preview that came anew each frame would leave no time for anything else.
-    stats.begun = std::mem::replace(&mut *previewed, redone.resets) != redone.resets;
+    // Once for each reset: a preview that came anew each frame would leave no time for anything else. And once for who begins
+    // to watch what was reset before.
+    let now = (redone.resets, budget.preview);
+    stats.begun = std::mem::replace(&mut *last, now) != now;
     if stats.begun {
         stats.noise = None;
         stats.noise_samples = 0;
@@ -312,12 +316,14 @@ pub fn trace_frame(
     seconds += start.elapsed().as_secs_f64();
     stats.rays = stats.rays + rays;
     stats.trace_seconds += seconds;
+    stats.frame_seconds = seconds;
     if rays.total() > 0 {
         stats.rays_per_second = rays.total() as f64 / seconds;
     }
     stats.samples_per_pixel = film.mean_samples();
     stats.done = film.complete_samples() >= target;
-    stats.preview_scale = (film.complete_samples() == 0).then(|| preview.scale()).filter(|&s| s > 1);
+    let coarse = preview.film().filter(|_| film.complete_samples() == 0);
+    stats.preview_scale = coarse.map(|_| preview.scale()).filter(|&scale| scale > 1);
     stats.dropped = film.dropped();
     // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter, if by then it has
     // become cheap beside them.

@@ -57,12 +57,16 @@ pub fn choose_camera(
     cameras: Query<Entity, (With<Camera>, With<Name>, Without<FlyCamera>)>,
     mut seen: ResMut<FileCameras>,
     mut active: ResMut<ActiveCamera>,
+    mut notices: ResMut<Notices>,
 ) {
     let mut camera = input.count(Tap::ResetCamera).gt(&0).then_some(seen.home);
     let steps = input.count(Tap::NextCamera) as i64 - input.count(Tap::PreviousCamera) as i64;
     if steps != 0 {
         let mut cameras: Vec<Entity> = cameras.iter().collect();
         cameras.sort_by_key(|camera| camera.index_u32());
+        if cameras.len() < 2 {
+            notices.0.push(Notice::Text("the file has no other camera".to_owned()));
+        }
         let here =
             cameras.iter().position(|&c| c == seen.last).map_or(if steps > 0 { -1 } else { 0 }, |i| i as i64);
         let there = (here + steps).checked_rem_euclid(cameras.len() as i64);

@@ -22,6 +22,12 @@ pub struct Chord {
 pub struct Letters(HashMap<KeyCode, String>);
 
 impl Letters {
+    /// How many are known.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
     /// `code` has typed `text`.
     pub fn learn(&mut self, code: KeyCode, text: &str) {
         let mut letters = text.chars();
@@ -83,7 +89,7 @@ fn code_of(name: &str) -> Option<KeyCode> {
 
 /// Short, and as it is printed on a US keyboard.
 fn name_of(code: KeyCode) -> String {
-    let name = format!("{code:?}");
+    let name = format!("{code:?}").replacen("Numpad", "Num", 1);
     let short = match code {
         KeyCode::Comma => ",",
         KeyCode::Period => ".",
@@ -94,6 +100,8 @@ fn name_of(code: KeyCode) -> String {
         KeyCode::BracketRight => "]",
         KeyCode::Equal => "+",
         KeyCode::Minus => "-",
+        KeyCode::NumpadAdd => "Num+",
+        KeyCode::NumpadSubtract => "Num-",
         KeyCode::Escape => "Esc",
         KeyCode::ArrowLeft => "Left",
         KeyCode::ArrowRight => "Right",

@@ -149,6 +149,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                     }
                     app = other;
                     prepare(&mut app, &self.interrupt);
+                    view_changed_at = Instant::now();
                 }
                 // Also if it could not be: what was missing may come.
                 files = self.watch(&app);
@@ -231,7 +232,8 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
                 Some(other)
             }
             Err(why) => {
-                (self.wake)(Wake::Notice(format!("still the old scene: {why}")));
+                let why = format!("still the old scene: {why}");
+                (self.wake)(if again { Wake::Notice(why) } else { Wake::NotOpened(why) });
                 None
             }
         }

@@ -24,6 +24,8 @@ pub enum Wake {
     Plain(Tap, Picture),
     /// Something to show to the user.
     Notice(String),
+    /// What the user wanted to open could not be, and why.
+    NotOpened(String),
     /// Something to be pasted elsewhere, and what to say before it.
     Copy {
         /// Nothing, or with its end of a sentence.

@@ -193,8 +193,11 @@ pub fn note_noise(
 ) {
     let instrument = instrument.bypass_change_detection();
     if (instrument.resets, instrument.region) != (redone.resets, film.region()) {
+        if instrument.resets != redone.resets {
+            // This frame has traced some of it already. (Another region keeps the samples, and so the time they took.)
+            instrument.start_seconds = stats.trace_seconds - stats.frame_seconds;
+        }
         (instrument.resets, instrument.region) = (redone.resets, film.region());
-        instrument.start_seconds = stats.trace_seconds;
         instrument.noted = 0;
         instrument.convergence = Convergence::default();
         let graph = Arc::make_mut(&mut instrument.graph);
@@ -209,7 +212,7 @@ pub fn note_noise(
         return;
     }
     instrument.noted = stats.noise_samples;
-    let seconds = (stats.trace_seconds - instrument.start_seconds).max(1e-6);
+    let seconds = stats.trace_seconds - instrument.start_seconds;
     let samples = stats.samples_per_pixel;
     let seen = || Seen::now(editor.as_deref(), &settings, playing.as_deref(), origin.as_deref());
     let reference = instrument.reference.as_ref();
@@ -254,7 +257,9 @@ mod tests {
             stats.noise = Some(0.4 / f64::from(n).sqrt());
             stats.noise_samples = n;
             stats.samples_per_pixel = f64::from(n);
-            stats.trace_seconds = before + 0.1 * f64::from(n);
+            let seconds = before + 0.1 * f64::from(n);
+            stats.frame_seconds = seconds - stats.trace_seconds;
+            stats.trace_seconds = seconds;
             world.run_system_cached(note_noise).unwrap();
             n = next_look(n);
         }
@@ -268,6 +273,10 @@ mod tests {
         let forecast = graph.forecast.unwrap();
         assert_eq!(forecast.goal, 0.02);
         let last = graph.current.last().unwrap();
+        // The first frame's time counts, too.
+        assert!(
+            (graph.current[0].seconds - 0.2).abs() < 1e-9 && (last.seconds - 0.1 * last.samples).abs() < 1e-9
+        );
         // 0.4 / √n = 0.02 at n = 400.
         let wanted = (400.0 - last.samples) * 0.1;
         assert!((forecast.seconds / wanted - 1.0).abs() < 1e-6, "{forecast:?} {wanted}");

@@ -44,6 +44,10 @@ impl Viewer {
         let pressed = event.state == ElementState::Pressed;
         let types = pressed && (self.ui.prompt.is_some() || self.ui.takes_text());
         if types && !self.is_for_the_window(code) {
+            // A key that was held when the line opened is not meant for it.
+            if event.repeat && self.keys.0.contains_key(&code) {
+                return;
+            }
             self.type_key(code, event.text.as_deref());
             return self.redraw();
         }
@@ -80,11 +84,11 @@ impl Viewer {
             };
         };
         let text = pasted.as_deref().or(text.filter(|_| !control));
-        match prompt.key(code, text) {
+        match prompt.key(code, text, control) {
             Typed::On => {}
             Typed::Nothing => self.ui.prompt = None,
             Typed::Open(path) => {
-                self.ui.prompt = None;
+                self.tried = self.ui.prompt.take();
                 self.record(&Event::Open(path.clone()));
                 self.send(Command::Open(path));
             }
@@ -135,7 +139,10 @@ impl Viewer {
             Tap::Graph => self.ui.graph = !self.ui.graph,
             Tap::Help => self.ui.help.turn(),
             Tap::Report => self.ui.report = !self.ui.report,
-            Tap::Open => self.ui.prompt = Some(Prompt::new(&self.options.folder)),
+            Tap::Open => {
+                self.tried = None;
+                self.ui.prompt = Some(Prompt::new(&self.options.folder));
+            }
             Tap::Escape => self.escape(),
             Tap::Split => {
                 self.split = self.cursor_in_picture().x;

@@ -6,6 +6,7 @@ use super::engine::Pending;
 use super::input::Input;
 use super::instrument::{Instrument, Seen};
 use super::keymap::Tap;
+use super::status::significant;
 use crate::app::FrameBudget;
 use crate::image::compare::LinearImage;
 use crate::image::{Display, Picture};
@@ -81,8 +82,10 @@ impl PixelView {
 pub struct Legend {
     /// What is shown.
     pub title: &'static str,
-    /// The values of the darkest and the lightest colour, if it is a scale.
+    /// The values at both ends of the colours, if it is a scale.
     pub range: Option<[String; 2]>,
+    /// How many there are, if that is the question.
+    pub count: Option<String>,
 }
 
 /// The legend of the picture that is shown; `None` if that is light.
@@ -199,7 +202,7 @@ pub fn develop_pixel_view(
     mut picture: ResMut<Picture>,
 ) {
     if budget.develop {
-        legend.set_if_neq(CurrentLegend(unknown.0.map(|title| Legend { title, range: None })));
+        legend.set_if_neq(CurrentLegend(unknown.0.map(|title| Legend { title, ..Legend::default() })));
         return;
     }
     if !(view.is_changed() || film.is_changed() || first.is_changed()) {
@@ -208,7 +211,11 @@ pub fn develop_pixel_view(
     let size = film.size();
     let radius = bounds.map_or(1.0, |bounds| bounds.radius as f32);
     let Some((colors, range)) = colors(*view, &film, &first, &instrument, radius) else { return };
-    legend.set_if_neq(CurrentLegend(Some(Legend { title: view.title(), range })));
+    let count = (*view == PixelView::NotFinite).then(|| match film.dropped() {
+        0 => "none".to_owned(),
+        count => format!("{count}, in the red pixels"),
+    });
+    legend.set_if_neq(CurrentLegend(Some(Legend { title: view.title(), range, count })));
     picture.size = size;
     picture.rgba.resize(colors.len() * 4, 255);
     for (rgba, color) in picture.rgba.chunks_exact_mut(4).zip(colors) {
@@ -306,7 +313,11 @@ fn near_bright(depths: &[f32], radius: f32) -> Colors {
     let grey = |depth: f32| {
         if depth.is_finite() { 255 - ((depth - nearest) / span * 220.0) as u8 } else { 0 }
     };
-    let range = nearest.is_finite().then(|| [format!("{farthest:.3}"), format!("{nearest:.3}")]);
+    // Nothing is told that both have in common: as many digits as tell them apart.
+    let digits = (farthest / span.max(f32::MIN_POSITIVE)).log10().ceil().clamp(0.0, 4.0) as u32 + 2;
+    let range = nearest
+        .is_finite()
+        .then(|| [nearest, farthest].map(|depth| significant(f64::from(depth), digits.min(6))));
     (depths.iter().map(|&depth| [grey(depth); 3]).collect(), range)
 }
 

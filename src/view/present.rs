@@ -255,7 +255,7 @@ impl Viewer {
         let writer = std::thread::spawn(move || {
             let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe.unwrap_or_default())
             {
-                Ok(path) => format!("saved {}", path.display()),
+                Ok(path) => format!("saved {}", path.strip_prefix(".").unwrap_or(&path).display()),
                 Err(why) => format!("no screenshot: {why}"),
             };
             drop(proxy.send_event(Wake::Notice(said)));

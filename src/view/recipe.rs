@@ -38,7 +38,33 @@ pub fn recipe(world: &World) -> Recipe {
     }
     add("--spp", format!("{}", stats.samples_per_pixel.round().max(1.0)));
     arguments.extend(look_flags(world));
-    let noise = stats.noise.map_or("unknown".to_owned(), percent);
-    let description = format!("{:.1} samples per pixel, noise {noise}", stats.samples_per_pixel);
-    Recipe { arguments, description }
+    Recipe { arguments, description: described(stats) }
+}
+
+/// How far the picture is. The noise is estimated now and then: of fewer samples it is told of how many.
+fn described(stats: &FrameStats) -> String {
+    let noise = match stats.noise {
+        None => "unknown".to_owned(),
+        Some(noise) if f64::from(stats.noise_samples) == stats.samples_per_pixel.floor() => percent(noise),
+        Some(noise) => format!("{} at {}", percent(noise), stats.noise_samples),
+    };
+    format!("{:.1} samples per pixel, noise {noise}", stats.samples_per_pixel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_noise_of_fewer_samples_is_told_as_that() {
+        let stats = |noise_samples| FrameStats {
+            samples_per_pixel: 20.5,
+            noise: Some(0.02),
+            noise_samples,
+            ..FrameStats::default()
+        };
+        assert_eq!(described(&stats(20)), "20.5 samples per pixel, noise 2 %");
+        assert_eq!(described(&stats(16)), "20.5 samples per pixel, noise 2 % at 16");
+        assert_eq!(described(&FrameStats::default()), "0.0 samples per pixel, noise unknown");
+    }
 }

@@ -224,7 +224,7 @@ pub fn machine(status: &Status) -> Vec<Cell> {
     let plain = |label, value: String| cell(label, value, String::new());
     let Machine { threads, counts, bytes, first_picture, developing } = status.machine;
     let [instances, triangles, lights] = counts;
-    let [film, shown, hierarchy] = bytes.map(|bytes| significant(bytes as f64 / 1e6, 3));
+    let [film, shown, hierarchy] = bytes.map(told_bytes);
     let [preview, carried] = first_picture.map(|seconds| significant(seconds * 1e3, 2));
     vec![
         plain(
@@ -232,11 +232,17 @@ pub fn machine(status: &Status) -> Vec<Cell> {
             [counted(triangles, "triangle"), counted(instances, "instance"), counted(lights, "light")]
                 .join(", "),
         ),
-        plain("memory", format!("film {film}, shown {shown}, hierarchy {hierarchy} MB")),
+        plain("memory", format!("film {film}, shown {shown}, hierarchy {hierarchy}")),
         plain("first picture", format!("preview {preview}, kept {carried} ms")),
         plain("development", format!("{} ms", significant(developing * 1e3, 2))),
         plain("threads", threads.to_string()),
     ]
+}
+
+/// In the unit that makes them short.
+fn told_bytes(bytes: usize) -> String {
+    let (unit, name) = if bytes < 1_000_000 { (1e3, "kB") } else { (1e6, "MB") };
+    format!("{} {name}", significant(bytes as f64 / unit, 3))
 }
 
 /// `digits` significant digits, without exponent while it is short.
@@ -355,6 +361,7 @@ pub(super) mod tests {
 
     #[test]
     fn numbers_are_short() {
+        assert_eq!([0, 1900, 12_345_678].map(told_bytes), ["0 kB", "1.90 kB", "12.3 MB"]);
         let digits = [0.0, 1234.5, 0.012_34, 9.999, 1e7].map(|x| significant(x, 3));
         assert_eq!(digits, ["0", "1234", "0.0123", "10.00", "1.00e7"]);
         assert_eq!([0.1, 0.005, 0.012_3, 1.0].map(percent), ["10 %", "0.5 %", "1.23 %", "100 %"]);

@@ -12,6 +12,7 @@ use super::screen::{Screen, vector};
 use super::sides::Compared;
 use super::status::Status;
 use super::ui::Ui;
+use super::ui::open::Prompt;
 use super::{Response, ViewError, ViewOptions};
 use crate::app::App;
 use crate::image::Picture;
@@ -72,6 +73,8 @@ pub struct Viewer {
     pub(super) asked: Option<Instant>,
     pub(super) ui: Ui,
     pub(super) notice: String,
+    /// The line whose file is being opened.
+    pub(super) tried: Option<Prompt>,
     /// What was copied is there as long as this is.
     clipboard: Option<arboard::Clipboard>,
     /// Where the recording says that the cursor is.
@@ -148,6 +151,7 @@ impl Viewer {
             asked: None,
             ui: Ui::default(),
             notice: String::new(),
+            tried: None,
             clipboard: None,
             recorded_cursor: None,
             title: String::new(),
@@ -317,7 +321,16 @@ impl ApplicationHandler<Wake> for Viewer {
             }
             Wake::Notice(text) => self.say(&text),
             Wake::Copy { said, text } => self.copy(&said, text),
+            Wake::NotOpened(why) => match self.tried.take() {
+                // Whoever has mistyped a name shall not have to type it again.
+                Some(tried) => {
+                    self.ui.prompt = Some(tried.failed(&why));
+                    self.redraw();
+                }
+                None => self.say(&why),
+            },
             Wake::Opened { name, folder } => {
+                self.tried = None;
                 self.options.folder = folder;
                 self.options.title = format!("Penumbra – {name}");
                 self.options.screenshot_stem = name;

@@ -71,6 +71,18 @@ fn a_typed_name_opens_a_scene_and_a_sky_and_a_wrong_one_says_so() {
     pause(1500);
     assert!(program.is_alive());
     assert!(green_and_red(&desktop.shot(&program)).1 > 1000, "the old scene stays");
+    // The line is still there, to be mended: an absolute path takes the place of what was typed.
+    desktop.xdotool([
+        "type",
+        "--delay",
+        "30",
+        &format!("/{}", desktop.directory.join("green.toml").display()),
+    ]);
+    desktop.xdotool(["key", "Return"]);
+    wait_for("the green floor again", || {
+        let (green, red) = green_and_red(&desktop.shot(&program));
+        (green > 1000 && red < 1000).then_some(())
+    });
     desktop.xdotool(["key", "ctrl+q"]);
     assert_eq!(program.wait().code(), Some(0));
 }

@@ -28,9 +28,10 @@ pub fn run(args: &WindowArgs) -> u8 {
     let (keys, notice) = match penumbra::view::keys_file::read(args.keys.as_deref()) {
         Ok(keys) => (keys, String::new()),
         // Whoever named no file may not see what is printed.
-        Err(error) if args.keys.is_none() => {
-            (penumbra::view::keymap::Keymap::default(), format!("the usual keys: {error}"))
-        }
+        Err(error) if args.keys.is_none() => (
+            penumbra::view::keymap::Keymap::default(),
+            format!("keys.toml ignored, usual keys in use: {error}"),
+        ),
         Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
     };
     if !notice.is_empty() {

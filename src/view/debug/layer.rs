@@ -24,6 +24,8 @@ pub struct Line {
     pub alpha: f32,
 }
 
+/// How dark it is around a line, compared with how opaque that is.
+const SHADE: f32 = 0.7;
 /// How opaque a line is behind surfaces, compared with before them.
 const HIDDEN: f32 = 0.16;
 /// A line that lies in a surface is before it: by this part of its depth.
@@ -106,6 +108,29 @@ impl Layer {
         }
     }
 
+    /// Darkens what is around the lines, so that light ones are seen on light walls.
+    pub fn shade_around(&mut self) {
+        let width = (self.size.x as usize).max(1);
+        // The most opaque of each pixel and those beside it, then of that above and below.
+        let mut beside = Vec::with_capacity(self.rgba.len());
+        for row in self.rgba.chunks_exact(width) {
+            let most =
+                |x: usize| row[x.saturating_sub(1)..(x + 2).min(width)].iter().map(|pixel| pixel[3]).max();
+            beside.extend((0..width).map(|x| most(x).unwrap_or(0)));
+        }
+        let rows: Vec<&[u8]> = beside.chunks_exact(width).collect();
+        for (y, line) in self.rgba.chunks_exact_mut(width).enumerate() {
+            let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(rows.len() - 1)].map(|y| rows[y]);
+            for (x, pixel) in line.iter_mut().enumerate() {
+                let most = above[x].max(here[x]).max(below[x]);
+                // Most of a picture has no lines.
+                if most > 0 {
+                    *pixel = over_shade(*pixel, SHADE * f32::from(most) / 255.0);
+                }
+            }
+        }
+    }
+
     /// Puts a colour over what is there.
     fn blend(&mut self, index: usize, color: [u8; 3], alpha: f32) {
         let old = self.rgba[index];
@@ -127,6 +152,14 @@ impl Layer {
             }
         }
     }
+}
+
+/// A colour over so much black.
+fn over_shade([r, g, b, own]: [u8; 4], shade: f32) -> [u8; 4] {
+    let own = f32::from(own) / 255.0;
+    let sum = own + shade * (1.0 - own);
+    let mix = |c: u8| (f32::from(c) * own / sum + 0.5) as u8;
+    [mix(r), mix(g), mix(b), (sum * 255.0 + 0.5) as u8]
 }
 
 #[cfg(test)]
@@ -154,6 +187,26 @@ mod tests {
         assert!(drawn > 60.0, "{drawn} of 101");
         let pixels = layer.rgba.iter().filter(|p| p[3] > 0).count();
         assert!(pixels < 40, "a line, no plane: {pixels}");
+    }
+
+    #[test]
+    fn around_a_line_it_is_darker_and_nowhere_else() {
+        let mut layer = Layer::new(SIZE);
+        let ends = [Vec3::new(-0.3, 0.0, -2.0), Vec3::new(0.3, 0.0, -2.0)];
+        layer.draw(&[Line { color: [255; 3], ..line(ends[0], ends[1]) }], &Viewpoint::default(), None);
+        let before = layer.clone();
+        layer.shade_around();
+        let mut white = vec![255; SIZE.element_product() as usize * 4];
+        layer.cover(&mut white);
+        assert!(white.iter().any(|&c| c < 180), "seen on white");
+        let width = SIZE.x as usize;
+        for (i, pixel) in layer.rgba.iter().enumerate() {
+            let rows = [i.wrapping_sub(width), i, i + width];
+            let near = rows.into_iter().flat_map(|i| [i.wrapping_sub(1), i, i + 1]);
+            let has_line = near.filter_map(|i| before.rgba.get(i)).any(|pixel| pixel[3] > 0);
+            assert_eq!(pixel[3] > 0, has_line, "{i}");
+            assert!(pixel[3] >= before.rgba[i][3]);
+        }
     }
 
     #[test]

@@ -151,6 +151,9 @@ impl Debug {
                 self.level = next.min(levels.saturating_sub(1));
                 self.boxes = Boxes::Level(self.level);
             }
+            Tap::NextStep | Tap::PreviousStep if self.pinned.is_none() => {
+                return Some("no pixel whose ray could go step by step: {pin} pins the one under the cursor");
+            }
             Tap::NextStep => self.step += 1,
             Tap::PreviousStep => self.step = self.step.saturating_sub(1),
             Tap::Order => {
@@ -319,6 +322,7 @@ pub fn draw_layer(
     let mut made = Layer::new(size);
     made.draw(&lines.0, &viewpoint, surfaces.map(crate::trace::first::Grid::cells));
     made.draw(&marks.lines(&viewpoint, size), &viewpoint, None);
+    made.shade_around();
     layer.0 = Some(Arc::new(made));
 }
 
@@ -332,6 +336,10 @@ mod tests {
         let mut press = || debug.press(&Tap::Pin.into(), &Viewpoint::default(), UVec2::splat(9), 1);
         assert_eq!(press(), Some("click a pixel to see its rays"));
         assert_eq!(press(), Some("no rays any more"));
+        for step in [Tap::NextStep, Tap::PreviousStep] {
+            let said = debug.press(&step.into(), &Viewpoint::default(), UVec2::splat(9), 1);
+            assert!(said.is_some_and(|said| said.contains("{pin}")), "{said:?}");
+        }
     }
 
     #[test]

@@ -167,3 +167,23 @@ fn a_camera_that_is_copied_or_remembered_is_where_it_has_moved_to() {
     press(&[Tap::Recall(1)]);
     assert_eq!(press(&[Tap::PrintCamera]), there);
 }
+
+#[test]
+fn the_first_picture_of_a_scene_is_whole() {
+    let source = SceneSource::parse("cornell").unwrap();
+    let wishes = Wishes { size: Some(UVec2::new(160, 160)), ..Wishes::default() };
+    let mut app = open(&source, &LoadOptions::default(), &wishes).unwrap().app;
+    app.world.init_resource::<Instrument>();
+    prepare(&mut app, &Arc::default());
+    // As if it had been interrupted at once.
+    app.world.resource_mut::<FrameBudget>().time = Some(Duration::ZERO);
+    app.frame();
+    let picture = app.world.resource::<Picture>();
+    let seen = picture.rgba.chunks_exact(4).filter(|pixel| pixel[..3] != [0; 3]).count();
+    assert!(seen > 160 * 160 / 2, "{seen} pixels");
+    assert!(app.world.resource::<FrameStats>().preview_scale.is_some());
+    // And that was it.
+    app.world.resource_mut::<Input>().end_frame();
+    app.frame();
+    assert!(!app.world.resource::<FrameStats>().begun);
+}

@@ -141,6 +141,21 @@ impl Keymap {
         }
     }
 
+    /// Further keys of a row, behind the first of each.
+    #[must_use]
+    pub fn other_keys_of(&self, row: &Row, letters: &Letters) -> String {
+        let mut names = Vec::new();
+        for entry in row.entries {
+            let found = self.0.iter().find(|(known, _)| known.name == entry.name);
+            let labels = found.map_or(&[][..], |(_, chords)| chords).iter().map(|chord| chord.label(letters));
+            let mut labels = labels.collect::<Vec<String>>().into_iter();
+            let first = labels.next();
+            // Both Shift keys are called the same.
+            names.extend(labels.filter(|label| Some(label) != first.as_ref()));
+        }
+        names.join(" ")
+    }
+
     /// The whole help as plain text.
     #[must_use]
     pub fn text(&self, letters: &Letters) -> String {
@@ -213,6 +228,22 @@ mod tests {
         assert_eq!(action(Digit1, true, true), Some(Action::Tap(Tap::Remember(1))));
         assert_eq!(action(KeyT, false, true), Some(Action::Tap(Tap::ToneMap)));
         assert_eq!(action(KeyW, false, true), Some(Action::Hold(Hold::Forward)), "Shift flies faster");
+    }
+
+    #[test]
+    fn other_keys_are_told_once_and_by_other_names() {
+        let row = |name: &str| {
+            let rows = TABLE.iter().flat_map(|(_, rows)| *rows);
+            rows.clone().find(|row| row.entries.iter().any(|entry| entry.name == name)).copied().unwrap()
+        };
+        let keys = super::super::keys_file::parse("undo = ['Z', 'F9']\nhud = []\nquit = []").unwrap();
+        let others = |name: &str| keys.other_keys_of(&row(name), &Letters::default());
+        assert_eq!(others("up"), "PageUp PageDown");
+        assert_eq!(others("front"), "Num1 Num3 Num7");
+        assert_eq!(
+            (others("undo"), others("fast"), others("quit")),
+            ("F9".to_owned(), String::new(), String::new())
+        );
     }
 
     #[test]

@@ -41,6 +41,10 @@ fn more_is_lighter_and_depth_is_darker() {
     assert_eq!(range.unwrap(), ["0", "20"]);
     let (colors, _) = near_bright(&[1.0, 5.0, f32::INFINITY], 1.0);
     assert_eq!(colors, [[255; 3], [35; 3], [0; 3]]);
+    let (_, range) = near_bright(&[800.006, 1359.2], 1.0);
+    assert_eq!(range.unwrap(), ["800", "1359"], "from near to far");
+    let (_, range) = near_bright(&[1000.1, 1000.9], 1.0);
+    assert_eq!(range.unwrap(), ["1000.10", "1000.90"], "as many digits as tell them apart");
     near_bright(&[f32::INFINITY; 3], 1.0);
     assert_eq!(linear(&[]).0.len(), 0);
 }

@@ -3,33 +3,49 @@
 use super::super::debug::boxes::{Boxes, Statistics};
 use super::super::debug::{DebugStatus, Told, color_of};
 use super::super::status::{counted, significant};
-use super::card;
 use super::place::Places;
 use super::style::{ACCENT, FAINT, MARGIN};
+use super::touchable_card;
 use crate::bvh::inspect::{Order, Visited, Visits};
 use crate::trace::explain::{Kind, LightRow};
-use egui::{Align2, Color32, Context, Grid, Rect, RichText, Ui, vec2};
+use egui::{Align2, Color32, Context, Frame, Grid, Margin, Rect, RichText, ScrollArea, Ui, vec2};
+use glam::UVec2;
 
-/// More lines would cover the picture.
-const MOST_ROWS: usize = 9;
+/// Nobody scrolls through more lines.
+const MOST_ROWS: usize = 50;
+/// How high the lines of the lights may be together, points, least and most; and how high about all the others are.
+const LIGHTS: [f32; 2] = [45.0, 150.0];
+const OTHERS: f32 = 110.0;
+/// Around the pinned pixel, points, what shall be seen of it.
+const PIN: f32 = 40.0;
 
-/// Shows the card in the lower left corner, or where that is taken beside it.
-pub fn show(context: &Context, status: &DebugStatus, places: &Places) -> Option<Rect> {
+/// Shows the card in the lower left corner, or where that is taken or the pinned pixel of a picture of `size` is, in another.
+pub fn show(context: &Context, status: &DebugStatus, size: UVec2, places: &Places) -> Option<Rect> {
     if status.told.is_none() && status.statistics.is_none() {
         return None;
     }
+    let own = places.size_of(context, "debug").x + MARGIN;
+    let (left, right) = (places.room.left(), places.room.right());
     let corners = [
         (Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN)),
         (Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN)),
         (Align2::RIGHT_BOTTOM, vec2(-MARGIN, -MARGIN)),
+        (Align2::LEFT_TOP, vec2(MARGIN, places.reach(left, left + own, true))),
+        (Align2::RIGHT_TOP, vec2(-MARGIN, places.reach(right - own, right, true))),
     ];
-    let place = places.find(context, "debug", &corners);
-    Some(card(context, "debug", place, |ui| {
+    let pinned = status.told.as_ref().map(|told| {
+        let part = (told.explanation.pixel.as_vec2() + 0.5) / size.max(UVec2::ONE).as_vec2();
+        let at = places.room.min + vec2(part.x, part.y) * places.room.size();
+        Rect::from_center_size(at, vec2(2.0 * PIN, 2.0 * PIN))
+    });
+    let place = places.find_clear_of(pinned, context, "debug", &corners);
+    let lights = (0.5 * places.room.height() - OTHERS).clamp(LIGHTS[0], LIGHTS[1]);
+    Some(touchable_card(context, "debug", place, |ui| {
         if let Some(statistics) = &status.statistics {
             show_statistics(ui, status.boxes, statistics);
         }
         if let Some(told) = &status.told {
-            show_pixel(ui, told, status);
+            show_pixel(ui, told, status, lights);
         }
     }))
 }
@@ -52,7 +68,7 @@ fn show_statistics(ui: &mut Ui, boxes: Boxes, statistics: &Statistics) {
         shown => format!("{shown} boxes"),
     };
     let text = format!(
-        "{boxes}; {}, {}, {} kB, cost {}",
+        "{boxes}; {}, {}, {} kB, SAH cost {}",
         counted(statistics.instances, "instance"),
         counted(statistics.nodes, "node"),
         statistics.bytes / 1000,
@@ -64,7 +80,7 @@ fn show_statistics(ui: &mut Ui, boxes: Boxes, statistics: &Statistics) {
     faint(ui, format!("leaves × triangles: {}", sizes.join(", ")));
 }
 
-fn show_pixel(ui: &mut Ui, told: &Told, status: &DebugStatus) {
+fn show_pixel(ui: &mut Ui, told: &Told, status: &DebugStatus, height: f32) {
     let explanation = &told.explanation;
     let pixel = explanation.pixel;
     ui.label(RichText::new(format!("pixel {}, {}", pixel.x, pixel.y)).color(ACCENT));
@@ -80,18 +96,13 @@ fn show_pixel(ui: &mut Ui, told: &Told, status: &DebugStatus) {
             ui.label(RichText::new(name).color(Color32::from_rgb(r, g, b)).small());
         }
     });
-    Grid::new("lights").num_columns(7).spacing([10.0, 2.0]).show(ui, |ui| {
-        for title in ["light", "lit / sampled", "density, 1/sr", "unblocked", "brings", "nodes", "triangles"]
-        {
-            faint(ui, title);
-        }
-        ui.end_row();
-        for row in explanation.lights.iter().take(MOST_ROWS) {
-            show_light(ui, row);
-        }
-    });
-    if explanation.lights.len() > MOST_ROWS {
-        faint(ui, format!("and {} more", explanation.lights.len() - MOST_ROWS));
+    if explanation.lights.is_empty() {
+        faint(ui, if told.hit.is_none() { "hits nothing" } else { "no light was sampled" });
+    } else {
+        let lights = ScrollArea::vertical().min_scrolled_height(LIGHTS[0]).max_height(height);
+        // The bar that tells where one is stands to the right of the numbers.
+        let margin = Frame::new().inner_margin(Margin { right: 8, ..Margin::ZERO });
+        lights.show(ui, |ui| margin.show(ui, |ui| show_lights(ui, &explanation.lights)));
     }
     let [stack, queue] = told.visits;
     for (name, visits, order) in [("near first", stack, Order::NearFirst), ("queue", queue, Order::Queue)] {
@@ -119,6 +130,23 @@ fn cost_line(name: &str, visits: &Visits) -> String {
     let (nodes, triangles) = (counted(*nodes as usize, "node"), counted(*triangles as usize, "triangle"));
     let boxes = if *boxes == 1 { "1 box".to_owned() } else { format!("{boxes} boxes") };
     format!("{name}: {nodes}, {boxes}, {triangles}, {waiting} waiting at most")
+}
+
+fn show_lights(ui: &mut Ui, rows: &[LightRow]) {
+    let grid = Grid::new("lights").num_columns(7).spacing([10.0, 2.0]).min_row_height(0.0);
+    grid.show(ui, |ui| {
+        for title in ["light", "lit / sampled", "density, 1/sr", "unblocked", "brings", "nodes", "triangles"]
+        {
+            faint(ui, title);
+        }
+        ui.end_row();
+        for row in rows.iter().take(MOST_ROWS) {
+            show_light(ui, row);
+        }
+    });
+    if rows.len() > MOST_ROWS {
+        faint(ui, format!("and {} more", rows.len() - MOST_ROWS));
+    }
 }
 
 fn show_light(ui: &mut Ui, row: &LightRow) {

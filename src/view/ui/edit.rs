@@ -16,6 +16,19 @@ const FIELD: f32 = 96.0;
 const HEAD: f32 = 64.0;
 const FOOT: f32 = 52.0;
 
+/// How far from the top and the bottom of the window it has to stay.
+fn ends(places: &Places) -> [f32; 2] {
+    let right = places.room.right();
+    let left = right - WIDTH - MARGIN;
+    [true, false].map(|from_top| places.reach(left, right, from_top))
+}
+
+/// How high it can be, points.
+#[must_use]
+pub fn height(places: &Places) -> f32 {
+    places.room.height() - ends(places).iter().sum::<f32>()
+}
+
 /// Shows the card at the right border, between the cards above and below; what the user changes on it goes to `changed`.
 pub fn show(
     context: &Context,
@@ -23,15 +36,15 @@ pub fn show(
     places: &Places,
     changed: &mut Vec<(Property, f64)>,
 ) -> Rect {
-    let right = places.room.right();
-    let left = right - WIDTH - MARGIN;
-    let (top, bottom) = (places.reach(left, right, true), places.reach(left, right, false));
-    let height = (places.room.height() - top - bottom).max(3.0 * MARGIN);
+    let [top, _] = ends(places);
+    let height = height(places).max(3.0 * MARGIN);
     let area = Area::new(Id::new("edit")).anchor(Align2::RIGHT_TOP, vec2(-MARGIN, top)).fade_in(false);
     let shown = area.show(context, |ui| {
         style::frame().show(ui, |ui| {
             let frame = style::frame().total_margin().sum();
             ui.set_width((WIDTH - frame.x).min(places.room.width()));
+            // Not as high as it was last: that may have been of something with fewer numbers.
+            ui.set_max_height(height - frame.y);
             ui.label(RichText::new(&status.name).color(ACCENT));
             let [here, all] = status.place;
             ui.horizontal_wrapped(|ui| {
@@ -44,8 +57,10 @@ pub fn show(
                 }
             });
             let source = ScrollSource { drag: false, ..ScrollSource::ALL };
-            let numbers =
-                ScrollArea::vertical().max_height((height - HEAD - FOOT).max(MARGIN)).scroll_source(source);
+            let numbers = ScrollArea::vertical()
+                .min_scrolled_height(MARGIN)
+                .max_height((height - HEAD - FOOT).max(MARGIN))
+                .scroll_source(source);
             numbers.show(ui, |ui| show_numbers(ui, status, changed));
             if !status.redone.is_empty() {
                 ui.label(RichText::new(&status.redone).color(FAINT).small());

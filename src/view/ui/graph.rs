@@ -106,25 +106,51 @@ fn ticks(range: &RangeInclusive<f64>) -> impl Iterator<Item = (f64, bool)> {
         .filter(move |(x, _)| (low..=high).contains(&decade(*x)))
 }
 
+/// The ticks that are drawn, powers of ten before others: where labels have no room, those stay.
+fn rounder_first(range: &RangeInclusive<f64>, sparse: bool) -> Vec<(f64, bool)> {
+    let mut all: Vec<(f64, bool)> = ticks(range).filter(|(_, round)| *round || sparse).collect();
+    all.sort_by_key(|(_, round)| !round);
+    all
+}
+
+/// Where labels stand.
+#[derive(Default)]
+struct Labels(Vec<Rect>);
+
+impl Labels {
+    /// Whether a label has room there; then it is taken.
+    fn take(&mut self, rect: Rect) -> bool {
+        let is_free = !self.0.iter().any(|other| other.intersects(rect));
+        if is_free {
+            // With some space beside it.
+            self.0.push(rect.expand2(vec2(4.0, 0.0)));
+        }
+        is_free
+    }
+}
+
 fn plot(painter: &Painter, axes: Axes, graph: &Graph) {
     let clipped = painter.with_clip_rect(axes.rect.expand(1.0));
     let font = FontId::proportional(10.0);
     // Few decades need more words.
     let sparse = |range: &RangeInclusive<f64>| range.end() - range.start() < 2.2;
-    for (seconds, round) in ticks(&axes.seconds) {
+    let mut labels = Labels::default();
+    for (seconds, _) in rounder_first(&axes.seconds, sparse(&axes.seconds)) {
         let x = axes.place(seconds, 1.0).x;
-        if round || sparse(&axes.seconds) {
-            painter.vline(x, axes.rect.y_range(), Stroke::new(1.0, LINE));
-            let at = pos2(x, axes.rect.bottom() + 3.0);
-            painter.text(at, Align2::CENTER_TOP, short_time(seconds), font.clone(), FAINT);
+        painter.vline(x, axes.rect.y_range(), Stroke::new(1.0, LINE));
+        let text = painter.layout_no_wrap(short_time(seconds), font.clone(), FAINT);
+        let rect = Align2::CENTER_TOP.anchor_size(pos2(x, axes.rect.bottom() + 3.0), text.size());
+        if labels.take(rect) {
+            painter.galley(rect.min, text, FAINT);
         }
     }
-    for (error, round) in ticks(&axes.errors) {
+    for (error, _) in rounder_first(&axes.errors, sparse(&axes.errors)) {
         let y = axes.place(1.0, error).y;
-        if round || sparse(&axes.errors) {
-            painter.hline(axes.rect.x_range(), y, Stroke::new(1.0, LINE));
-            let at = pos2(axes.rect.left() - 4.0, y);
-            painter.text(at, Align2::RIGHT_CENTER, percent(error), font.clone(), FAINT);
+        painter.hline(axes.rect.x_range(), y, Stroke::new(1.0, LINE));
+        let text = painter.layout_no_wrap(percent(error), font.clone(), FAINT);
+        let rect = Align2::RIGHT_CENTER.anchor_size(pos2(axes.rect.left() - 4.0, y), text.size());
+        if labels.take(rect) {
+            painter.galley(rect.min, text, FAINT);
         }
     }
     curve(&clipped, &axes, &graph.previous, |p| Some(p.noise), FAINT.gamma_multiply(0.8));
@@ -200,6 +226,15 @@ mod tests {
     fn ticks_are_round_numbers_inside() {
         let found: Vec<f64> = ticks(&(-1.0..=1.0)).map(|(x, _)| x).collect();
         assert_eq!(found, [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]);
+    }
+
+    #[test]
+    fn labels_leave_room_for_each_other_and_tens_come_first() {
+        let order: Vec<f64> = rounder_first(&(0.0..=1.0), true).into_iter().map(|(x, _)| x).collect();
+        assert_eq!(order, [1.0, 10.0, 2.0, 5.0]);
+        let mut labels = Labels::default();
+        let mut take = |x: f32| labels.take(Rect::from_min_size(pos2(x, 0.0), vec2(20.0, 10.0)));
+        assert_eq!([0.0, 15.0, 22.0, 25.0, 60.0].map(&mut take), [true, false, false, true, true]);
     }
 
     #[test]

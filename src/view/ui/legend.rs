@@ -10,6 +10,9 @@ use egui::{Align2, Color32, Context, Mesh, Rect, RichText, Sense, Shape, Ui, pos
 pub fn show(context: &Context, legend: &Legend) -> Rect {
     card(context, "legend", (Align2::RIGHT_TOP, vec2(-MARGIN, MARGIN)), |ui| {
         ui.label(legend.title);
+        if let Some(count) = &legend.count {
+            ui.label(RichText::new(count).color(FAINT).small());
+        }
         if let Some([low, high]) = &legend.range {
             ui.horizontal(|ui| {
                 ui.label(RichText::new(low).color(FAINT).small());
@@ -20,7 +23,8 @@ pub fn show(context: &Context, legend: &Legend) -> Rect {
     })
 }
 
-const GREYS: [[u8; 3]; 2] = [[35; 3], [255; 3]];
+/// From near to far.
+const GREYS: [[u8; 3]; 2] = [[255; 3], [35; 3]];
 
 fn bar(ui: &mut Ui, colors: &[[u8; 3]]) {
     let (rect, _) = ui.allocate_exact_size(vec2(120.0, 9.0), Sense::hover());

@@ -2,6 +2,7 @@
 
 pub mod debug;
 pub mod edit;
+mod events;
 pub mod graph;
 pub mod help;
 pub mod legend;
@@ -17,17 +18,12 @@ use super::debug::DebugStatus;
 use super::edit::property::Property;
 use super::keymap::Keymap;
 use super::status::{Level, Measured, Status, altered};
-use egui::{
-    Align2, Area, Context, Event, Id, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, RawInput, Rect,
-    RichText, ViewportId, pos2, vec2,
-};
-use glam::{DVec2, UVec2};
+use egui::{Align2, Area, Context, Event, Id, Pos2, RawInput, Rect, RichText, ViewportId, vec2};
+use glam::UVec2;
 use paint::Painter;
 use place::{Place, Places};
 use std::time::Instant;
 use style::{ACCENT, MARGIN};
-use winit::event::MouseButton;
-use winit::keyboard::KeyCode;
 
 /// What there is to show.
 pub struct Content<'a> {
@@ -127,94 +123,6 @@ impl Ui {
         self.painter.paint(rgba, size, &primitives, output.pixels_per_point);
     }
 
-    /// The cursor is at this pixel now. Whether a card wants to show that.
-    pub fn pointer(&mut self, at: DVec2, (display, size): (f64, UVec2)) -> bool {
-        let at = at.as_vec2() / scale_of(display, size);
-        self.events.push(Event::PointerMoved(pos2(at.x, at.y)));
-        self.context.is_pointer_over_area() && self.context.wants_pointer_input()
-    }
-
-    /// A mouse button. Whether it was meant for a card.
-    pub fn button(&mut self, button: MouseButton, pressed: bool) -> bool {
-        let pos = self.events.iter().rev().find_map(|event| match event {
-            Event::PointerMoved(pos) => Some(*pos),
-            _ => None,
-        });
-        let Some(pos) = pos.or(self.context.pointer_latest_pos()) else { return false };
-        let over = self.context.layer_id_at(pos).is_some_and(|layer| layer.order != egui::Order::Background);
-        if pressed && !over {
-            self.let_go();
-        }
-        if button != MouseButton::Left {
-            return pressed && over;
-        }
-        if !(over || self.context.is_using_pointer()) {
-            return false;
-        }
-        let button = PointerButton::Primary;
-        self.events.push(Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE });
-        true
-    }
-
-    /// The keyboard is the picture's again; a number that is being typed counts as it is.
-    fn let_go(&self) {
-        self.context.memory_mut(|memory| {
-            if let Some(id) = memory.focused() {
-                memory.surrender_focus(id);
-            }
-        });
-    }
-
-    /// Whether what is typed goes into a card.
-    #[must_use]
-    pub fn takes_text(&self) -> bool {
-        self.context.wants_keyboard_input()
-    }
-
-    /// Something is put into a card.
-    pub fn paste(&mut self, text: String) {
-        self.events.push(Event::Paste(text));
-    }
-
-    /// The wheel was turned. Whether it was meant for a card.
-    pub fn wheel(&mut self, notches: f64) -> bool {
-        let is_over = self.context.is_pointer_over_area();
-        if is_over {
-            let (unit, delta) = (MouseWheelUnit::Line, vec2(0.0, notches as f32));
-            self.events.push(Event::MouseWheel { unit, delta, modifiers: Modifiers::NONE });
-        }
-        is_over
-    }
-
-    /// Something is typed into a card, Ctrl being down or not.
-    pub fn key(&mut self, code: KeyCode, text: Option<&str>, control: bool) {
-        let key = match code {
-            KeyCode::Enter | KeyCode::NumpadEnter => Some(Key::Enter),
-            KeyCode::Escape => Some(Key::Escape),
-            KeyCode::Backspace => Some(Key::Backspace),
-            KeyCode::Delete => Some(Key::Delete),
-            KeyCode::ArrowLeft => Some(Key::ArrowLeft),
-            KeyCode::ArrowRight => Some(Key::ArrowRight),
-            KeyCode::Tab => Some(Key::Tab),
-            KeyCode::Home => Some(Key::Home),
-            KeyCode::End => Some(Key::End),
-            KeyCode::KeyA if control => Some(Key::A),
-            KeyCode::KeyZ if control => Some(Key::Z),
-            _ => None,
-        };
-        match (key, text) {
-            (Some(key), _) => self.events.push(Event::Key {
-                key,
-                physical_key: None,
-                pressed: true,
-                repeat: false,
-                modifiers: if control { Modifiers::COMMAND } else { Modifiers::NONE },
-            }),
-            (None, Some(text)) if !control => self.events.push(Event::Text(text.to_owned())),
-            (None, _) => {}
-        }
-    }
-
     /// Whether there is nothing to draw, so that the picture needs no second look.
     #[must_use]
     pub fn is_bare(&self, content: &Content) -> bool {
@@ -252,7 +160,8 @@ impl Ui {
             });
         }
         self.help.show(context, content.keys, content.letters);
-        if !content.notice.is_empty() {
+        // What is read is not to be covered; the notice is still there when it is closed.
+        if !content.notice.is_empty() && !reads {
             let at = |anchor, y| (anchor, vec2(0.0, y));
             let width = places.size_of(context, "notice").x;
             let (left, right) = (places.room.center().x - 0.5 * width, places.room.center().x + 0.5 * width);
@@ -260,7 +169,8 @@ impl Ui {
             let below = at(Align2::CENTER_TOP, places.reach(left, right, true));
             let bottom = at(Align2::CENTER_BOTTOM, -MARGIN);
             let place = places.find(context, "notice", &[bottom, above, below]);
-            card(context, "notice", place, |ui| {
+            let area = Area::new(Id::new("notice")).interactable(false).order(egui::Order::Foreground);
+            show_card(context, area, place, |ui| {
                 ui.set_max_width(places.room.width() - 6.0 * MARGIN);
                 ui.label(content.notice);
             });
@@ -280,19 +190,26 @@ impl Ui {
             places.take(legend::show(context, legend));
         }
         if let Some((name, part)) = content.compared {
+            let middle = places.room.center().x;
+            let half = 0.5 * places.size_of(context, "compared").x;
+            let most = (0.5 * places.room.width() - half - MARGIN).max(0.0);
+            // Where both meet.
+            let beside = if part < 1.0 { (part as f32 - 0.5) * places.room.width() } else { 0.0 };
+            let beside = beside.clamp(-most, most);
             // Below the status, also where that is as wide as the window.
-            let (left, right) = (places.room.center().x - 60.0, places.room.center().x + 60.0);
-            let place = (Align2::CENTER_TOP, vec2(0.0, places.reach(left, right, true)));
+            let down = places.reach(middle + beside - half, middle + beside + half, true);
+            let place = (Align2::CENTER_TOP, vec2(beside, down));
             places.take(card(context, "compared", place, |ui| {
                 ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
                 let text = if part < 1.0 { format!("{name}  |  now") } else { name.to_owned() };
                 ui.label(RichText::new(text).color(ACCENT));
             }));
         }
-        let is_edited = status.edit.is_some() && (places.is_roomy() || !status.debug.is_open());
-        if let Some(card) = debug::show(context, &status.debug, places).filter(|_| places.is_roomy()) {
+        if let Some(card) = debug::show(context, &status.debug, status.size, places) {
             places.take(card);
         }
+        let has_room = places.is_roomy() && edit::height(places) >= FEWEST_NUMBERS;
+        let is_edited = status.edit.is_some() && (has_room || !status.debug.is_open());
         // With both others open, it must leave room for the numbers.
         let room = places.room.height() - graph::height(places.room) - LEAST_NUMBERS;
         let fits = if is_edited && status.debug.is_open() { room > 0.0 } else { true };
@@ -307,22 +224,48 @@ impl Ui {
 
 /// Height, points, below which a card of numbers is of no use.
 const LEAST_NUMBERS: f32 = 190.0;
+/// The same, if what is in its way is what was asked about a pixel.
+const FEWEST_NUMBERS: f32 = 150.0;
 
-/// Where the cards are that may be in each other's way.
-fn rects(context: &Context) -> [Option<Rect>; 8] {
-    let names = ["status", "altered", "legend", "compared", "debug", "graph", "edit", "notice"];
+/// Where all cards are.
+fn rects(context: &Context) -> [Option<Rect>; 12] {
+    let names = [
+        "status", "altered", "legend", "compared", "debug", "graph", "edit", "notice", "loading", "open",
+        "report", "help",
+    ];
     context.memory(|memory| names.map(|name| memory.area_rect(Id::new(name))))
 }
 
-/// A translucent card with rounded corners; returns where it is.
-pub fn card(
+/// A translucent card with rounded corners, through which the mouse acts on the picture; returns where it is.
+pub fn card(context: &Context, name: &str, place: Place, content: impl FnOnce(&mut egui::Ui)) -> Rect {
+    show_card(context, Area::new(Id::new(name)).interactable(false), place, content)
+}
+
+/// The same, but the mouse acts on the card.
+pub fn touchable_card(
     context: &Context,
     name: &str,
+    place: Place,
+    content: impl FnOnce(&mut egui::Ui),
+) -> Rect {
+    show_card(context, Area::new(Id::new(name)), place, content)
+}
+
+fn show_card(
+    context: &Context,
+    area: Area,
     (anchor, offset): Place,
     content: impl FnOnce(&mut egui::Ui),
 ) -> Rect {
-    let area = Area::new(Id::new(name)).anchor(anchor, offset).fade_in(false).interactable(false);
-    area.show(context, |ui| style::frame().show(ui, content)).response.rect
+    let area = area.anchor(anchor, offset).fade_in(false);
+    let frame = style::frame();
+    let room = context.content_rect().width() - 2.0 * MARGIN - frame.total_margin().sum().x;
+    let content = |ui: &mut egui::Ui| {
+        // Or it would be no wider than it was last, whatever it has to say now.
+        ui.set_max_width(room.max(MARGIN));
+        content(ui);
+    };
+    area.show(context, |ui| frame.show(ui, content)).response.rect
 }
 
 #[cfg(test)]

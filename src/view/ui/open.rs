@@ -1,7 +1,7 @@
 //! A line to type the name of a file into, which completes it.
 
 use super::card;
-use super::style::{ACCENT, BRIGHT, FAINT};
+use super::style::{ACCENT, BRIGHT, CAUTION, FAINT};
 use crate::load::built_in_scenes;
 use egui::{Align2, Context, FontId, RichText, vec2};
 use std::path::{Path, PathBuf};
@@ -16,8 +16,12 @@ const MOST_NAMES: usize = 8;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Prompt {
     text: String,
+    /// Where the next letter goes, in bytes.
+    cursor: usize,
     /// What it could become.
     names: Vec<String>,
+    /// Why the last key came to nothing.
+    said: String,
 }
 
 /// What a key did to the line.
@@ -35,13 +39,23 @@ impl Prompt {
     /// A line that begins with `text`.
     #[must_use]
     pub fn new(text: &str) -> Self {
-        let mut prompt = Self { text: text.to_owned(), names: Vec::new() };
+        let mut prompt = Self { text: text.to_owned(), cursor: text.len(), ..Self::default() };
         prompt.look();
         prompt
     }
 
-    /// A key was pressed.
-    pub fn key(&mut self, code: KeyCode, text: Option<&str>) -> Typed {
+    /// The same line, of which nothing came because of `why`.
+    #[must_use]
+    pub fn failed(mut self, why: &str) -> Self {
+        why.clone_into(&mut self.said);
+        // What is there may be another by now.
+        self.look();
+        self
+    }
+
+    /// A key was pressed, Ctrl being down or not.
+    pub fn key(&mut self, code: KeyCode, text: Option<&str>, control: bool) -> Typed {
+        self.said.clear();
         match code {
             KeyCode::Escape => return Typed::Nothing,
             KeyCode::Enter | KeyCode::NumpadEnter if self.text.is_empty() => return Typed::Nothing,
@@ -50,19 +64,67 @@ impl Prompt {
                 if !self.text.ends_with(std::path::is_separator) {
                     self.text.push('/');
                 }
+                self.cursor = self.text.len();
             }
             KeyCode::Enter | KeyCode::NumpadEnter => return Typed::Open(PathBuf::from(at_home(&self.text))),
-            KeyCode::Backspace => drop(self.text.pop()),
             KeyCode::Tab => self.complete(),
-            _ => self.text.extend(text.unwrap_or("").chars().filter(|c| !c.is_control())),
+            KeyCode::KeyU if control => self.remove(0, self.cursor),
+            KeyCode::Backspace if control => self.remove(self.word_before(), self.cursor),
+            KeyCode::Backspace => self.remove(self.before(), self.cursor),
+            KeyCode::Delete => self.remove(self.cursor, self.after()),
+            KeyCode::ArrowLeft if control => self.cursor = self.word_before(),
+            KeyCode::ArrowLeft => self.cursor = self.before(),
+            KeyCode::ArrowRight => self.cursor = self.after(),
+            KeyCode::Home => self.cursor = 0,
+            KeyCode::KeyA if control => self.cursor = 0,
+            KeyCode::End => self.cursor = self.text.len(),
+            KeyCode::KeyE if control => self.cursor = self.text.len(),
+            _ => self.insert(text.unwrap_or("")),
         }
         self.look();
         Typed::On
     }
 
+    fn remove(&mut self, from: usize, to: usize) {
+        self.text.replace_range(from..to, "");
+        self.cursor = from;
+    }
+
+    /// Where the letter before the cursor begins.
+    fn before(&self) -> usize {
+        self.text[..self.cursor].char_indices().next_back().map_or(0, |(at, _)| at)
+    }
+
+    /// Where the letter after the cursor ends.
+    fn after(&self) -> usize {
+        self.text[self.cursor..].chars().next().map_or(self.cursor, |letter| self.cursor + letter.len_utf8())
+    }
+
+    /// Where the name of a file or folder before the cursor begins.
+    fn word_before(&self) -> usize {
+        let before = self.text[..self.cursor].trim_end_matches(std::path::is_separator);
+        before.rfind(std::path::is_separator).map_or(0, |at| at + 1)
+    }
+
+    /// Types `text`. A path that begins anew in the middle of the line, with `//` or `/~`, takes the place of what stands
+    /// before it: nobody has to delete a folder first.
+    fn insert(&mut self, text: &str) {
+        let typed: String = text.chars().filter(|c| !c.is_control()).collect();
+        self.text.insert_str(self.cursor, &typed);
+        self.cursor += typed.len();
+        let anew = ["//", "/~"].into_iter().filter_map(|begin| self.text[..self.cursor].rfind(begin)).max();
+        if let Some(at) = anew {
+            self.text.replace_range(..=at, "");
+            self.cursor -= at + 1;
+        }
+    }
+
     /// Adds what all names have in common.
     fn complete(&mut self) {
-        let Some(first) = self.names.first() else { return };
+        let Some(first) = self.names.first() else {
+            "nothing here begins like that".clone_into(&mut self.said);
+            return;
+        };
         let mut common = first.as_str();
         for name in &self.names {
             let same = common.char_indices().zip(name.chars()).take_while(|((_, a), b)| a == b);
@@ -73,6 +135,7 @@ impl Prompt {
         if common.len() > typed.len() {
             self.text = format!("{folder}{common}");
         }
+        self.cursor = self.text.len();
     }
 
     /// The folder, with its end, and the beginning of a name in it.
@@ -136,7 +199,12 @@ pub fn show(context: &Context, prompt: &Prompt) {
                 .color(FAINT)
                 .small(),
         );
-        ui.label(RichText::new(format!("{}_", prompt.text)).font(FontId::monospace(14.0)).color(ACCENT));
+        let (before, after) = prompt.text.split_at(prompt.cursor);
+        let line = if after.is_empty() { format!("{before}_") } else { format!("{before}|{after}") };
+        ui.label(RichText::new(line).font(FontId::monospace(14.0)).color(ACCENT));
+        if !prompt.said.is_empty() {
+            ui.label(RichText::new(&prompt.said).color(CAUTION));
+        }
         for name in prompt.names.iter().take(MOST_NAMES) {
             ui.label(RichText::new(name).font(FontId::monospace(11.0)).color(BRIGHT));
         }
@@ -160,27 +228,62 @@ mod tests {
         }
         let mut prompt = Prompt::new(&format!("{}/", folder.display()));
         assert_eq!(prompt.names, ["models/", "room_a.glb", "room_b.obj"], "a text is no scene");
-        assert_eq!(prompt.key(KeyCode::KeyR, Some("r")), Typed::On);
-        prompt.key(KeyCode::Tab, Some("\t"));
+        assert_eq!(prompt.key(KeyCode::KeyR, Some("r"), false), Typed::On);
+        prompt.key(KeyCode::Tab, Some("\t"), false);
         assert!(prompt.text.ends_with("/room_"), "{prompt:?}");
-        prompt.key(KeyCode::KeyB, Some("b"));
-        prompt.key(KeyCode::Tab, None);
-        assert_eq!(prompt.key(KeyCode::Enter, Some("\r")), Typed::Open(folder.join("room_b.obj")));
+        prompt.key(KeyCode::KeyB, Some("b"), false);
+        prompt.key(KeyCode::Tab, None, false);
+        assert_eq!(prompt.key(KeyCode::Enter, Some("\r"), false), Typed::Open(folder.join("room_b.obj")));
         for _ in 0.."room_b.obj".len() {
-            prompt.key(KeyCode::Backspace, None);
+            prompt.key(KeyCode::Backspace, None, false);
         }
-        prompt.key(KeyCode::KeyM, Some("m"));
-        prompt.key(KeyCode::Tab, None);
+        prompt.key(KeyCode::KeyM, Some("m"), false);
+        prompt.key(KeyCode::Tab, None, false);
         assert_eq!(prompt.names, ["sky.hdr"], "into the folder");
-        assert_eq!(prompt.key(KeyCode::Escape, None), Typed::Nothing);
+        assert_eq!(prompt.key(KeyCode::Escape, None, false), Typed::Nothing);
         std::fs::remove_dir_all(&folder).unwrap();
-        assert_eq!(Prompt::default().key(KeyCode::Enter, None), Typed::Nothing);
+        assert_eq!(Prompt::default().key(KeyCode::Enter, None, false), Typed::Nothing);
         // Where scenes are compiled in, and the user's own folder.
         assert!(Prompt::new("corn").names.iter().any(|name| name == "cornell"));
         if let Ok(home) = std::env::var("HOME") {
-            let typed = Prompt::new("~/a.glb").key(KeyCode::Enter, None);
+            let typed = Prompt::new("~/a.glb").key(KeyCode::Enter, None, false);
             assert_eq!(typed, Typed::Open(Path::new(&home).join("a.glb")));
         }
         assert_eq!(at_home("a~/b"), "a~/b");
+    }
+
+    #[test]
+    fn a_line_can_be_changed_anywhere_and_begun_anew() {
+        let typed = |start: &str, keys: &[(KeyCode, Option<&str>, bool)]| {
+            let mut prompt = Prompt::new(start);
+            for &(code, text, control) in keys {
+                assert_eq!(prompt.key(code, text, control), Typed::On);
+            }
+            prompt.text
+        };
+        let paste = |text| (KeyCode::KeyV, Some(text), true);
+        assert_eq!(typed("legocar/", &[paste("/work/a.glb")]), "/work/a.glb", "an absolute path");
+        assert_eq!(typed("legocar/", &[paste("~/a.glb\n")]), "~/a.glb");
+        assert_eq!(typed("legocar/", &[paste("a.glb")]), "legocar/a.glb");
+        assert_eq!(typed("", &[paste("//a")]), "/a");
+        let (back, left) = (KeyCode::Backspace, KeyCode::ArrowLeft);
+        assert_eq!(typed("a/b/c.glb", &[(KeyCode::KeyU, Some("\u{15}"), true)]), "");
+        assert_eq!(typed("a/b/c.glb", &[(back, None, true)]), "a/b/");
+        assert_eq!(typed("a/b/", &[(back, None, true)]), "a/");
+        assert_eq!(typed("a/äb", &[(left, None, false), (back, None, false)]), "a/b");
+        assert_eq!(typed("ab", &[(KeyCode::Home, None, false), (KeyCode::Delete, None, false)]), "b");
+        assert_eq!(typed("ab", &[(left, None, false), paste("c"), paste("d")]), "acdb");
+        assert_eq!(typed("", &[(back, None, true), (back, None, false), (KeyCode::Delete, None, false)]), "");
+    }
+
+    #[test]
+    fn what_came_to_nothing_is_told_until_the_next_key() {
+        let mut prompt = Prompt::new("no such folder/x");
+        prompt.key(KeyCode::Tab, None, false);
+        assert!(!prompt.said.is_empty() && prompt.text == "no such folder/x", "{prompt:?}");
+        prompt.key(KeyCode::KeyY, Some("y"), false);
+        assert_eq!(prompt.said, "");
+        let failed = prompt.clone().failed("no such file");
+        assert_eq!((failed.text.as_str(), failed.said.as_str()), ("no such folder/xy", "no such file"));
     }
 }

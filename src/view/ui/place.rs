@@ -43,12 +43,26 @@ impl Places {
     /// The first of `places` where the card `name`, as large as it was last, lies over no other; else the first.
     #[must_use]
     pub fn find(&self, context: &Context, name: &str, places: &[Place]) -> Place {
+        self.find_clear_of(None, context, name, places)
+    }
+
+    /// The same, and if it can be it does not lie over `seen` either.
+    #[must_use]
+    pub fn find_clear_of(
+        &self,
+        seen: Option<Rect>,
+        context: &Context,
+        name: &str,
+        places: &[Place],
+    ) -> Place {
         let size = self.size_of(context, name);
-        let free = places.iter().find(|(anchor, offset)| {
-            let at = anchor.align_size_within_rect(size, self.room).translate(*offset);
+        let at = |(anchor, offset): &Place| anchor.align_size_within_rect(size, self.room).translate(*offset);
+        let mut free = places.iter().filter(|place| {
+            let at = at(place);
             self.room.contains_rect(at) && !self.taken.iter().any(|card| card.intersects(at))
         });
-        *free.unwrap_or(&places[0])
+        let first = free.clone().next().unwrap_or(&places[0]);
+        *free.find(|place| !seen.is_some_and(|seen| seen.intersects(at(place)))).unwrap_or(first)
     }
 
     /// How far the cards reach down from the top, or up from the bottom if not `from_top`, in the columns between `left` and
@@ -79,8 +93,13 @@ mod tests {
         let corners = [(Align2::LEFT_BOTTOM, vec2(10.0, -10.0)), (Align2::RIGHT_BOTTOM, vec2(-10.0, -10.0))];
         // Its size is not known: nothing is in the way of nothing.
         assert_eq!(places.find(&context, "card", &corners), corners[0]);
+        let seen = Rect::from_center_size(pos2(10.0, 390.0), vec2(9.0, 9.0));
+        assert_eq!(places.find_clear_of(Some(seen), &context, "card", &corners), corners[1]);
         places.take(Rect::from_min_max(pos2(0.0, 300.0), pos2(200.0, 395.0)));
         assert_eq!(places.find(&context, "card", &corners), corners[1]);
+        let seen = |x: f32| Some(Rect::from_center_size(pos2(x, 390.0), vec2(9.0, 9.0)));
+        let clear_of = |x: f32| places.find_clear_of(seen(x), &context, "card", &corners);
+        assert_eq!([clear_of(300.0), clear_of(590.0)], [corners[1]; 2], "rather over that than over a card");
         places.take(Rect::from_min_max(pos2(400.0, 20.0), pos2(590.0, 100.0)));
         assert_eq!(places.reach(380.0, 590.0, true), 100.0 + MARGIN);
         assert_eq!(places.reach(0.0, 390.0, true), MARGIN);

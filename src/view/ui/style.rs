@@ -42,6 +42,8 @@ pub fn apply(context: &Context) {
         style.animation_time = 0.0;
         style.scroll_animation = ScrollAnimation::none();
         style.spacing.item_spacing = vec2(8.0, 4.0);
+        // That there is more to see is seen before the mouse is there.
+        style.spacing.scroll.dormant_handle_opacity = 0.7;
         let proportional = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles.insert(TextStyle::Body, proportional(13.0));
         style.text_styles.insert(TextStyle::Button, proportional(13.0));

@@ -2,7 +2,10 @@ use super::super::edit::EditStatus;
 use super::super::edit::property::Row;
 use super::super::status::tests::status;
 use super::*;
+use glam::DVec2;
 use std::sync::Arc;
+use winit::event::MouseButton;
+use winit::keyboard::KeyCode;
 
 /// What there is to show, with nothing open.
 fn content<'a>(
@@ -51,12 +54,41 @@ fn everything_goes_into_a_window_of_any_size_on_any_display() {
     }
 }
 
+/// What selects a thing with so many numbers.
+fn edited(rows: usize) -> EditStatus {
+    let row = |i: usize| Row {
+        property: Property::Position(i % 3),
+        label: "x",
+        value: 1.0,
+        step: 0.1,
+        grows: false,
+        range: [-1e3, 1e3],
+    };
+    EditStatus { name: format!("{rows}"), rows: (0..rows).map(row).collect(), ..EditStatus::default() }
+}
+
+#[test]
+fn cards_grow_with_what_they_have_to_say() {
+    let (keys, letters, size) = (Keymap::default(), Letters::default(), UVec2::new(640, 480));
+    let see = |ui: &mut Ui, loading: &'static str, rows: usize| {
+        let status = Status { edit: Some(Arc::new(edited(rows))), ..status() };
+        let content = Content { loading: Some(loading), ..content(Some(&status), "", &keys, &letters) };
+        let mut rgba = vec![90; size.element_product() as usize * 4];
+        ui.draw(&mut rgba, size, 1.0, &content);
+        rgba
+    };
+    let later = ("loading a large scene: decompressing 35 %", 14);
+    let mut grown = Ui::default();
+    see(&mut grown, "loading", 3);
+    assert!(see(&mut grown, later.0, later.1) == see(&mut Ui::default(), later.0, later.1));
+}
+
 #[test]
 fn every_page_of_the_help_is_inside_the_window() {
     let (keys, letters) = (Keymap::default(), Letters::default());
     let content = content(None, "", &keys, &letters);
     for (width, height, most) in
-        [(1920, 1080, 1), (960, 540, 2), (640, 400, 4), (320, 240, 12), (200, 600, 12)]
+        [(1920, 1080, 1), (960, 540, 1), (700, 450, 2), (640, 400, 3), (320, 240, 6), (200, 600, 12)]
     {
         let mut ui = Ui { level: Level::None, ..Ui::default() };
         let mut pages = 0;
@@ -107,17 +139,7 @@ fn the_same_twice_is_the_same_to_the_bit() {
 
 #[test]
 fn a_click_into_the_picture_takes_the_keyboard_from_the_card() {
-    let mut status = status();
-    let row = |i| Row {
-        property: Property::Position(i),
-        label: "x",
-        value: 1.0,
-        step: 0.1,
-        grows: false,
-        range: [-1e3, 1e3],
-    };
-    let edited = EditStatus { rows: (0..3).map(row).collect(), ..EditStatus::default() };
-    status.edit = Some(Arc::new(edited));
+    let status = Status { edit: Some(Arc::new(edited(3))), ..status() };
     let (keys, letters) = (Keymap::default(), Letters::default());
     let content = content(Some(&status), "", &keys, &letters);
     let size = UVec2::new(640, 400);
