@@ -136,7 +136,7 @@ pub(super) fn left(world: &mut World, open: bool) -> Vec<String> {
     let (mut tried, mut wrong) = (0, Vec::new());
     for corners in &triangles {
         let Some(alone) = Alone::new(mesh(&[*corners]), HERE) else { continue };
-        let rays = rays_off(&alone, &mut rng, 200, leave);
+        let (rays, _) = rays_off(&alone, &mut rng, 200, leave);
         tried += rays.len();
         let again = rays.iter().filter(|ray| alone.geometry.tlas.closest_hit(ray).is_some());
         wrong.extend(again.map(|ray| ray.origin));
