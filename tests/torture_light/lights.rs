@@ -79,7 +79,7 @@ fn what_is_expected_is_what_the_tables_say() {
         ("L4", touching_the_floor(), &near),
         ("L5", edge_on(), &aside),
         ("L6", far(), &far_away),
-        ("L7", huge(), &[3.14159265358]),
+        ("L7", huge(), &[std::f64::consts::PI]),
         ("L11", shadow, &shown),
     ] {
         assert_eq!(spots.len(), figures.len(), "{name}");
