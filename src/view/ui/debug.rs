@@ -5,7 +5,7 @@ use super::super::debug::{DebugStatus, Told, color_of};
 use super::super::status::{counted, significant};
 use super::place::Places;
 use super::style::{ACCENT, FAINT, MARGIN};
-use super::touchable_card;
+use super::{SCROLLING, scrolling_card};
 use crate::bvh::inspect::{Order, Visited, Visits};
 use crate::trace::explain::{Kind, LightRow};
 use egui::{Align2, Color32, Context, Frame, Grid, Margin, Rect, RichText, ScrollArea, Ui, vec2};
@@ -24,7 +24,7 @@ pub fn show(context: &Context, status: &DebugStatus, size: UVec2, places: &Place
     if status.told.is_none() && status.statistics.is_none() {
         return None;
     }
-    let own = places.size_of(context, "debug").x + MARGIN;
+    let own = places.size_of(context, SCROLLING).x + MARGIN;
     let (left, right) = (places.room.left(), places.room.right());
     let corners = [
         (Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN)),
@@ -38,9 +38,9 @@ pub fn show(context: &Context, status: &DebugStatus, size: UVec2, places: &Place
         let at = places.room.min + vec2(part.x, part.y) * places.room.size();
         Rect::from_center_size(at, vec2(2.0 * PIN, 2.0 * PIN))
     });
-    let place = places.find_clear_of(pinned, context, "debug", &corners);
+    let place = places.find_clear_of(pinned, context, SCROLLING, &corners);
     let lights = (0.5 * places.room.height() - OTHERS).clamp(LIGHTS[0], LIGHTS[1]);
-    Some(touchable_card(context, "debug", place, |ui| {
+    Some(scrolling_card(context, place, |ui| {
         if let Some(statistics) = &status.statistics {
             show_statistics(ui, status.boxes, statistics);
         }

@@ -1,7 +1,7 @@
 //! What the user does to cards, with mouse and keyboard.
 
-use super::{Ui, scale_of};
-use egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, pos2, vec2};
+use super::{SCROLLING, Ui, scale_of};
+use egui::{Event, Id, Key, LayerId, Modifiers, MouseWheelUnit, Order, PointerButton, pos2, vec2};
 use glam::{DVec2, UVec2};
 use winit::event::MouseButton;
 use winit::keyboard::KeyCode;
@@ -21,7 +21,8 @@ impl Ui {
             _ => None,
         });
         let Some(pos) = pos.or(self.context.pointer_latest_pos()) else { return false };
-        let over = self.context.layer_id_at(pos).is_some_and(|layer| layer.order != egui::Order::Background);
+        let acts = |layer: LayerId| layer.order != Order::Background && layer.id != Id::new(SCROLLING);
+        let over = self.context.layer_id_at(pos).is_some_and(acts);
         if pressed && !over {
             self.let_go();
         }

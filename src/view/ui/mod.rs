@@ -241,14 +241,12 @@ pub fn card(context: &Context, name: &str, place: Place, content: impl FnOnce(&m
     show_card(context, Area::new(Id::new(name)).interactable(false), place, content)
 }
 
-/// The same, but the mouse acts on the card.
-pub fn touchable_card(
-    context: &Context,
-    name: &str,
-    place: Place,
-    content: impl FnOnce(&mut egui::Ui),
-) -> Rect {
-    show_card(context, Area::new(Id::new(name)), place, content)
+/// The card that the wheel turns while clicks go through it, to the next pixel.
+const SCROLLING: &str = "debug";
+
+/// The same, but the wheel acts on the card.
+pub fn scrolling_card(context: &Context, place: Place, content: impl FnOnce(&mut egui::Ui)) -> Rect {
+    show_card(context, Area::new(Id::new(SCROLLING)), place, content)
 }
 
 fn show_card(

@@ -1,3 +1,4 @@
+use super::super::debug::Told;
 use super::super::edit::EditStatus;
 use super::super::edit::property::Row;
 use super::super::status::tests::status;
@@ -81,6 +82,23 @@ fn cards_grow_with_what_they_have_to_say() {
     let mut grown = Ui::default();
     see(&mut grown, "loading", 3);
     assert!(see(&mut grown, later.0, later.1) == see(&mut Ui::default(), later.0, later.1));
+}
+
+#[test]
+fn the_card_of_a_pixel_leaves_the_pixel_free() {
+    let (keys, letters, size) = (Keymap::default(), Letters::default(), UVec2::new(640, 400));
+    for pixel in [UVec2::new(60, 370), UVec2::new(600, 370), UVec2::new(320, 20), UVec2::new(20, 200)] {
+        let mut told = Told::default();
+        told.explanation.pixel = pixel;
+        let debug = DebugStatus { told: Some(Arc::new(told)), ..DebugStatus::default() };
+        let status = Status { debug, size, ..status() };
+        let mut ui = Ui { level: Level::None, ..Ui::default() };
+        let mut rgba = vec![90; size.element_product() as usize * 4];
+        ui.draw(&mut rgba, size, 1.0, &content(Some(&status), "", &keys, &letters));
+        assert_eq!(rgba[(4 * (pixel.y * size.x + pixel.x)) as usize], 90, "{pixel}");
+        let covered = rgba.chunks_exact(4).filter(|p| p[0] != 90).count();
+        assert!(covered > 10_000, "{covered} pixels of the card");
+    }
 }
 
 #[test]
