@@ -157,3 +157,76 @@ fn triangles_that_go_round_against_their_normals_are_turned() {
     assert_eq!(only_mesh(&mut world).triangles, [[0, 2, 1]]);
     assert_says(&report.warnings().join("\n"), "turned over");
 }
+
+#[test]
+fn gloss_without_an_exponent_is_no_second_white_paint() {
+    // As MeshLab, SketchUp and trimesh write everything.
+    for statements in
+        ["Ks 1 1 1\nNs 0\nKd 1 0 0", "Ks 0.33 0.33 0.33\nKd 1 0 0", "Ks 0.4 0.4 0.4\nNs 1\nKd 1 0 0"]
+    {
+        let (_, m, report) = material(statements);
+        assert_eq!((m.base_color, m.glossy), (Vec3::X, Glossy::None), "{statements}");
+        assert_says(&report.decisions().join("\n"), "no highlight");
+    }
+    for statements in ["Ks 0.4 0.4 0.4\nNs 2\nKd 0.5 0 0", "Ks 0.4 0.4 0.4\nmap_Ns red.png\nKd 0.5 0 0"] {
+        assert!(matches!(material(statements).1.glossy, Glossy::BlinnPhong { .. }), "{statements}");
+    }
+    assert_ne!(material("Ks 1 1 1\nKd 0 0 0\nillum 3").1.mirror, Vec3::ZERO);
+}
+
+#[test]
+fn what_has_a_picture_is_no_clear_glass() {
+    let (_, m, report) = material("Kd 1 1 1\nmap_Kd red.png\nNi 1.5\nillum 7");
+    assert!(m.glass.is_none() && m.base_color_texture.is_some());
+    assert_says(&report.decisions().join("\n"), "its picture");
+    let (_, m, report) = material("Kd 1 0 0\nTf 0.5 0.5 0.5\nillum 7\nNi 1.5");
+    assert!(m.glass.is_some());
+    assert_says(&report.decisions().join("\n"), "Kd is not seen");
+}
+
+#[test]
+fn the_colour_of_seven_numbers_is_the_first_three_of_four() {
+    let colors = |tail: &str| {
+        let text = format!("v 0 0 0 {tail}\nv 1 0 0 {tail}\nv 0 1 0 {tail}\nf 1 2 3\n");
+        only_mesh(&mut loaded("a.obj", &text).0).colors[0].truncate()
+    };
+    assert_eq!(colors("1 0 0 1"), Vec3::X);
+    assert_eq!(colors("1 0 0 0"), Vec3::ZERO, "a weight, and black");
+    assert_eq!(colors("0 0 1 0.5"), Vec3::Z);
+}
+
+#[test]
+fn options_may_stand_behind_the_name_and_alpha_in_the_picture() {
+    let (world, m, report) = material("Kd 1 1 1\nmap_Kd red.png -s 2 2 1");
+    assert_eq!(report.warnings(), [""; 0]);
+    let of = m.base_color_texture.unwrap();
+    assert_eq!(of.uv_transform.transform_vector2(Vec2::X), Vec2::X * 2.0);
+    assert!(world.get::<Texture>(of.texture).is_some() && m.alpha == Alpha::Opaque);
+    // A leaf: there is something, and beside it there is nothing.
+    let leaf = picture(&[[0, 200, 0, 255], [0; 4], [0; 4], [0; 4]].concat(), 2, image::ImageFormat::Png);
+    let with = |statements: &str| {
+        let obj =
+            format!("mtllib a.mtl\n{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n");
+        let library = format!("newmtl m\nmap_Kd leaf.png\n{statements}\n");
+        let files: [(&str, &[u8]); 3] =
+            [("a.obj", obj.as_bytes()), ("a.mtl", library.as_bytes()), ("leaf.png", &leaf)];
+        named::<Material>(&mut loaded_all(&files).0, "m").alpha
+    };
+    assert_eq!((with(""), with("d 1")), (Alpha::Blend, Alpha::Blend));
+    assert_eq!(with("map_d leaf.png"), Alpha::Blend);
+}
+
+#[test]
+fn a_library_that_was_renamed_with_its_scene_is_found() {
+    let obj = format!("mtllib old.mtl\n{QUAD}usemtl m\nf 1 2 3 4\n");
+    let files: [(&str, &[u8]); 2] = [("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl m\nKd 1 0 0\n")];
+    let (mut world, report) = loaded_all(&files);
+    assert_eq!(named::<Material>(&mut world, "m").base_color, Vec3::X);
+    assert_says(&report.warnings().join("\n"), "`a.mtl` beside it is taken");
+}
+
+#[test]
+fn what_is_no_scene_is_called_so() {
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 3\n";
+    assert_says(&refusal("a.obj", pointer), "git lfs pull");
+}

@@ -23,6 +23,7 @@ mod relief;
 mod textures;
 
 use super::error::LoadError;
+use super::first_bytes::not_a_scene;
 use super::geometry;
 use super::report::{Phase, Sink};
 use super::settings::Materials;
@@ -46,6 +47,11 @@ pub(super) fn load(
     sink: &mut Sink<'_>,
 ) -> Result<(), LoadError> {
     sink.begin(Phase::Parsing);
+    // Text in UTF-16 has an answer of its own.
+    let is_wide = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
+    if let Some(what) = not_a_scene(&bytes).filter(|_| !is_wide) {
+        return Err(LoadError::broken(file, "content", format!("is {what}")));
+    }
     let text = lines::text_of(file, &bytes)?;
     let mut raw = Raw::default();
     lines::for_each(&text, |statement| raw.read(file, &statement))?;

@@ -33,8 +33,9 @@ pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
     }));
     tables.extend(editor.waiting.iter().cloned());
     for &(entity, slot) in &editor.edited {
-        // What is as it was stays whatever the scene's files will say of it.
-        let mut past = editor.undo.iter().filter(|undo| undo.original.is_none());
+        // What is as it was stays whatever the scene's files will say of it. But copies are made of things not edited yet.
+        let is_copy = editor.copies.iter().any(|&(copy, _)| copy == entity);
+        let mut past = editor.undo.iter().filter(|undo| undo.original.is_none() && !is_copy);
         let before = past.clone().find(|undo| undo.selection.entity == entity);
         let of_slot = past.find(|undo| undo.selection == Selection { entity, slot });
         let material = super::property::material_of(world, entity, slot);
