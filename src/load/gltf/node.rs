@@ -12,6 +12,8 @@ use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::DAffine3;
 use gltf::json::Index;
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
 
 /// Spawns the default scene (else the first, else all root nodes) below `root`.
 pub(super) fn spawn_scene(
@@ -34,8 +36,8 @@ pub(super) fn spawn_scene(
     order.iter().for_each(|&i| flat[i] |= parents[i].is_some_and(|parent| flat[parent]));
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let mut meshes = Meshes::default();
-    if nodes.is_empty() && !document.root.meshes.is_empty() {
-        sink.decide(document.file, "no node in it; shows each mesh once");
+    if nodes.iter().all(|node| node.mesh.is_none()) && !document.root.meshes.is_empty() {
+        sink.decide(document.file, "no node shows a mesh: each is shown once");
         for i in 0..document.root.meshes.len() {
             let built = meshes.get(document, &Index::new(i as u32), None, &mut palette, "file", sink)?;
             let entity = sink.spawn((Name::new(format!("mesh {i}")), Transform::default(), ChildOf(root)));
@@ -91,6 +93,13 @@ pub(super) fn spawn_scene(
             Some(holder) => instantiate(&built, holder, sink),
             None => place(document, node, entity, &built, &user, sink)?,
         }
+    }
+    // A mesh that says nothing of its place is left out of others, but is no scene.
+    let mut primitives = document.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let has_positions =
+        |p: &Primitive| p.attributes.keys().any(|key| *key == Checked::Valid(Semantic::Positions));
+    if document.root.meshes.iter().any(|mesh| !mesh.primitives.is_empty()) && !primitives.any(has_positions) {
+        return Err(document.broken("meshes", "no POSITION in any: nothing says where vertices are"));
     }
     animation::spawn_all(document, &entities, sink)
 }

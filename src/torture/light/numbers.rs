@@ -134,7 +134,11 @@ fn few_samples(trial: &Trial<'_>, spot: &Spot, samples: u32, sampling: Sampling,
         })
         .collect();
     // A fifth of the light's spread by one sample, over the root of all.
-    let bound = if trial.effort == Effort::Long { 1e-3 } else { 5e-3 };
+    let bound = match trial.effort {
+        Effort::Quick => 1e-2,
+        Effort::Normal => 5e-3,
+        Effort::Long => 1e-3,
+    };
     let exact = match &spot.expected {
         Expected::Value { exact, .. } => exact(spot.point),
         _ => 0.0,
