@@ -210,7 +210,7 @@ fn furnaces_at(trial: &Trial<'_>, place: Place) -> Vec<Check> {
         checks.extend(white(trial, &what, stage, samples, 1.0));
     }
     // A closed room that shines: 1 / (1 − albedo). Paths are long where it is bright.
-    for (albedo, few) in [(0.5f32, 640), (0.8, 2560)] {
+    for (albedo, few) in [(0.5f32, 640), (0.8, 4400)] {
         if trial.effort != Effort::Long && place != Place::ORIGIN {
             continue;
         }
