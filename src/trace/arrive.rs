@@ -19,6 +19,7 @@ const SAME_PLACE: f32 = 1.0 + 1e-6;
 
 impl Batch {
     /// What the end of a path's ray sends back along it, and where it goes on.
+    #[inline]
     pub(super) fn arrive(&mut self, scene: &TraceScene, index: usize) {
         let (path, hit) = (self.path(index), self.hits[index]);
         let reach = hit.map_or(path.ray.t_max, |hit| hit.t * SAME_PLACE);

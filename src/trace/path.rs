@@ -28,6 +28,7 @@ pub(super) struct Path {
 
 impl Path {
     /// What absorbs beyond a vertex.
+    #[inline]
     pub(super) fn absorption_toward(&self, surface: &Surface, at: &Interaction, wi: Vec3) -> Vec3 {
         match surface.body() {
             Some(body) if at.geometric_normal.dot(wi) < 0.0 => {
@@ -42,6 +43,7 @@ impl Path {
     }
 
     /// With what is left where its ray has come to `t`.
+    #[inline]
     pub(super) fn after(mut self, t: f32) -> Self {
         if self.absorption != Vec3::ZERO {
             self.throughput *= passed(self.absorption, t * self.ray.direction.length());

@@ -30,6 +30,7 @@ impl Piece {
     }
 
     /// What is on the side to which `plane`, a normal, points.
+    #[inline]
     pub(super) fn inside(&self, plane: Vec3) -> Self {
         let (mut inside, mut outside) = (Self::EMPTY, Self::EMPTY);
         self.split(plane, &mut inside, &mut outside);
@@ -40,6 +41,7 @@ impl Piece {
     /// have the corners in the plane in common.
     ///
     /// Reference: I. E. Sutherland, G. W. Hodgman, "Reentrant Polygon Clipping", CACM 17(1), 1974.
+    #[inline]
     pub(super) fn split(&self, plane: Vec3, inside: &mut Self, outside: &mut Self) {
         let Some(&last) = self.corners[..self.count].last() else { return };
         let mut before = last;
@@ -61,6 +63,7 @@ impl Piece {
     }
 
     /// Perhaps too many corners for it.
+    #[inline]
     pub(super) fn is_full(&self) -> bool {
         self.count == CORNERS
     }
@@ -73,6 +76,7 @@ impl Piece {
     }
 
     /// By the sum over its edges; its sign is that of the corners' sense of rotation.
+    #[inline]
     pub(super) fn irradiance(&self, normal: Vec3) -> f32 {
         let corners = &self.corners[..self.count];
         let Some(&(mut before)) = corners.last() else { return 0.0 };
