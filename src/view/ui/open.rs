@@ -262,7 +262,7 @@ mod tests {
             prompt.text
         };
         let paste = |text| (KeyCode::KeyV, Some(text), true);
-        assert_eq!(typed("legocar/", &[paste("/work/a.glb")]), "/work/a.glb", "an absolute path");
+        assert_eq!(typed("legocar/", &[paste("/scenes/a.glb")]), "/scenes/a.glb", "an absolute path");
         assert_eq!(typed("legocar/", &[paste("~/a.glb\n")]), "~/a.glb");
         assert_eq!(typed("legocar/", &[paste("a.glb")]), "legocar/a.glb");
         assert_eq!(typed("", &[paste("//a")]), "/a");
