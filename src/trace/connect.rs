@@ -45,16 +45,16 @@ pub(super) fn looks<'a>(
     let by_chance = !scene.lights.samples_all(depth);
     (0..scene.lights.picks(depth)).flat_map(move |index| {
         let members = scene.light_samples(depth, (!by_chance).then_some(index as u32));
-        (0..members).map(move |member| {
+        (0..members).filter_map(move |member| {
             let sampler = sampler.member([member, members]);
             let u = sampler.pair(base + LIGHT + index as u32 * 2);
             // One number for which light and where on it, so that samples are spread over all of them together; of very many it
             // has not digits enough.
             let is_one = scene.lights.len() <= KNOWN_LIGHTS;
             let random = if by_chance && !is_one { sampler.pair(base + PICK).x } else { u.x };
-            let (mut pick, rest) = scene.lights.pick(depth, index, &to, random);
+            let (mut pick, rest) = scene.lights.pick(depth, index, &to, random)?;
             pick.chance *= members as f32;
-            Look { pick, sampler, u: if is_one { Vec2::new(rest, u.y) } else { u } }
+            Some(Look { pick, sampler, u: if is_one { Vec2::new(rest, u.y) } else { u } })
         })
     })
 }

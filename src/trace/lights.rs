@@ -78,8 +78,6 @@ pub const ALL_LIGHTS: usize = 8;
 /// Of up to this many it is found out what is in their way; they are the bits of a word. Of a room's 24 panels most are seen whole,
 /// and none of these is left to chance.
 pub const KNOWN_LIGHTS: usize = 32;
-/// So often one of many is chosen evenly: what they are expected to bring does not know what is in between.
-const EVENLY: f32 = 0.25;
 /// Up to this many solid lights are not worth a hierarchy.
 const FEW_SHAPES: usize = 4;
 /// Of more solid shapes nobody asks whether one is in view.
@@ -145,28 +143,19 @@ impl Lights {
     }
 
     /// Pick number `index` of [`Lights::picks`]; `random` in [0, 1) chooses if not all are taken. Also what is left of it, a
-    /// fresh number.
+    /// fresh number. `None` if none could bring anything.
     #[must_use]
-    pub fn pick(&self, depth: u32, index: usize, to: &Receiver, random: f32) -> (Pick, f32) {
+    pub fn pick(&self, depth: u32, index: usize, to: &Receiver, random: f32) -> Option<(Pick, f32)> {
         if self.samples_all(depth) {
-            return (Pick { light: index as u32, chance: 1.0 }, random);
+            return Some((Pick { light: index as u32, chance: 1.0 }, random));
         }
-        if random < EVENLY {
-            let place = random / EVENLY * self.lights.len() as f32;
-            let light = (place as usize).min(self.lights.len() - 1) as u32;
-            return (Pick { light, chance: self.chance(depth, light, to) }, place.fract());
+        let place = random * self.groups();
+        if let Some(&light) = self.unplaced.get(place as usize) {
+            return Some((Pick { light, chance: 1.0 / self.groups() }, place.fract()));
         }
-        let rest = (random - EVENLY) / (1.0 - EVENLY) * self.groups();
-        if let Some(&light) = self.unplaced.get(rest as usize) {
-            return (Pick { light, chance: self.mixed(1.0) }, rest.fract());
-        }
-        if let Some(chosen) = self.tree.sample(to, rest.fract()) {
-            let light = self.placed[chosen.emitter];
-            return (Pick { light, chance: self.mixed(chosen.chance) }, chosen.rest);
-        }
-        // Only where the last of a group was missed by rounding.
-        let light = self.lights.len() as u32 - 1;
-        (Pick { light, chance: self.chance(depth, light, to) }, random)
+        let chosen = self.tree.sample(to, place.fract())?;
+        let light = self.placed[chosen.emitter];
+        Some((Pick { light, chance: chosen.chance / self.groups() }, chosen.rest))
     }
 
     /// The [`Pick::chance`] of `light` after `depth` bounces.
@@ -179,17 +168,12 @@ impl Lights {
             u32::MAX => 1.0,
             place => self.tree.chance(to, place as usize),
         };
-        self.mixed(among)
+        among / self.groups()
     }
 
     /// Suns and skies each, and all that is in the scene together, are chosen alike.
     fn groups(&self) -> f32 {
         self.unplaced.len() as f32 + if self.tree.is_empty() { 0.0 } else { 1.0 }
-    }
-
-    /// The chance of one that has this chance `among` its group, if it is chosen so.
-    fn mixed(&self, among: f32) -> f32 {
-        EVENLY / self.lights.len() as f32 + (1.0 - EVENLY) * among / self.groups()
     }
 
     /// Whether all lights are sampled at a vertex after `depth` bounces.
@@ -327,7 +311,7 @@ mod tests {
         assert!((chances.iter().sum::<f64>() - 1.0).abs() < 1e-6, "{chances:?}");
         let (mut counts, count) = ([0.0; 22], 1 << 16);
         for i in 0..count {
-            let (pick, _) = lights.pick(0, 0, &to, (i as f32 + 0.5) / count as f32);
+            let (pick, _) = lights.pick(0, 0, &to, (i as f32 + 0.5) / count as f32).unwrap();
             let chance = chances[pick.light as usize];
             assert!((f64::from(pick.chance) / chance - 1.0).abs() < 1e-5, "{pick:?} {chance}");
             counts[pick.light as usize] += 1.0 / f64::from(count);

@@ -2,7 +2,7 @@
 
 use super::emitter::{Emitter, Receiver};
 use super::light::{LightSample, sample_at, sample_flat};
-use super::light_tree::LightTree;
+use super::light_tree::{Chosen, LightTree};
 use super::spherical::{SphericalTriangle, meet, weights};
 use crate::bvh::Aabb;
 use glam::{Vec2, Vec3};
@@ -34,8 +34,6 @@ pub struct MeshLight {
 pub(super) const FEW: usize = 16;
 /// So many times smaller than their mean.
 const UNEVEN: f32 = 16.0;
-/// So often one of many is chosen by its area: what it is expected to bring does not know what is in between.
-const BY_AREA: f32 = 0.25;
 
 impl MeshLight {
     /// Whether the choice among its triangles matters more than the place on one.
@@ -95,7 +93,7 @@ impl MeshLight {
 
     /// What a choice among many lights needs to know.
     pub(super) fn emitter(&self) -> Emitter {
-        Emitter { intensity: self.shape.intensity * self.luminance, ..self.shape }
+        self.shape.times(self.luminance)
     }
 
     /// Unit normal of the side that shines; zero where it has none.
@@ -109,43 +107,36 @@ impl MeshLight {
         self.cumulative[i] - if i == 0 { 0.0 } else { self.cumulative[i - 1] }
     }
 
-    /// Chooses a triangle by its area; what is left of the random number is a fresh one.
-    fn by_area(&self, random: f32) -> (usize, f32) {
-        let i = self.cumulative.partition_point(|&c| c <= random).min(self.cumulative.len() - 1);
-        let below = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
-        (i, ((random - below) / self.part(i)).clamp(0.0, 1.0))
+    /// Chooses a triangle by a number in [0, 1).
+    fn choose(&self, to: &Receiver, random: f32) -> Option<Chosen> {
+        if !self.tree.is_empty() {
+            return self.tree.sample(to, random);
+        }
+        let last = self.cumulative.len().checked_sub(1)?;
+        let emitter = self.cumulative.partition_point(|&c| c <= random).min(last);
+        let below = if emitter == 0 { 0.0 } else { self.cumulative[emitter - 1] };
+        let chance = self.part(emitter);
+        Some(Chosen { emitter, chance, rest: ((random - below) / chance).clamp(0.0, 1.0) })
     }
 
-    /// Chooses a triangle: which, the probability of that, and what is left of the random number.
-    fn choose(&self, to: &Receiver, random: f32) -> (usize, f32, f32) {
-        if random < BY_AREA || self.tree.is_empty() {
-            let (i, rest) = self.by_area(if self.tree.is_empty() { random } else { random / BY_AREA });
-            return (i, self.chance(to, i), rest);
-        }
-        match self.tree.sample(to, (random - BY_AREA) / (1.0 - BY_AREA)) {
-            Some(chosen) => {
-                let i = chosen.emitter;
-                (i, BY_AREA * self.part(i) + (1.0 - BY_AREA) * chosen.chance, chosen.rest)
-            }
-            None => (0, self.chance(to, 0), 0.0),
-        }
+    /// Chooses a triangle for each of these, if it [`MeshLight::is_many`].
+    pub(super) fn choose_all(&self, wanted: &[(Receiver, f32)], chosen: &mut [Option<Chosen>]) {
+        self.tree.sample_all(wanted, chosen);
     }
 
     /// Probability of choosing number `i`.
     fn chance(&self, to: &Receiver, i: usize) -> f32 {
-        if self.tree.is_empty() {
-            return self.part(i);
-        }
-        BY_AREA * self.part(i) + (1.0 - BY_AREA) * self.tree.chance(to, i)
+        if self.tree.is_empty() { self.part(i) } else { self.tree.chance(to, i) }
     }
 
     /// A direction toward it; see [`super::light::FlatLight::sample`].
     pub(super) fn sample(&self, to: &Receiver, u: Vec2) -> Option<LightSample> {
-        if self.corners.is_empty() {
-            return None;
-        }
-        let point = to.point;
-        let (i, share, rest) = self.choose(to, u.x);
+        self.sample_on(&self.choose(to, u.x)?, to.point, u.y)
+    }
+
+    /// A direction toward the triangle that was chosen, by a number in [0, 1) and what is left of the first.
+    pub(super) fn sample_on(&self, chosen: &Chosen, point: Vec3, second: f32) -> Option<LightSample> {
+        let Chosen { emitter: i, chance: share, rest } = *chosen;
         let corners = &self.corners[i];
         let [a, b, c] = *corners;
         let at = |[b1, b2]: [f32; 2]| a * (1.0 - b1 - b2) + b * b1 + c * b2;
@@ -154,13 +145,13 @@ impl MeshLight {
         let (sample, [b1, b2]) = if is_near(corners, point) {
             let seen = seen_from(corners, point)?;
             let corners = corners.map(Vec3::as_dvec3);
-            let position = meet(&corners, point, seen.sample(f64::from(rest), f64::from(u.y)))?;
+            let position = meet(&corners, point, seen.sample(f64::from(rest), f64::from(second)))?;
             let weights = weights(corners[0], corners[1] - corners[0], corners[2] - corners[0], position);
             let pdf = (f64::from(share) / seen.solid_angle) as f32;
             (sample_at(point, position.as_vec3(), normal, pdf, self.two_sided, Vec3::ONE)?, weights)
         } else {
             let s = rest.sqrt();
-            let weights = [s * (1.0 - u.y), s * u.y];
+            let weights = [s * (1.0 - second), s * second];
             let area = 0.5 * cross.length() / share;
             (sample_flat(point, at(weights), normal, area, self.two_sided, Vec3::ONE)?, weights)
         };
@@ -227,7 +218,7 @@ mod tests {
                 let (mut counts, count) = ([0.0; 40], 1 << 16);
                 for i in 0..count {
                     let random = (i as f32 + 0.5) / count as f32;
-                    counts[light.choose(&to, random).0] += 1.0 / f64::from(count);
+                    counts[light.choose(&to, random).unwrap().emitter] += 1.0 / f64::from(count);
                     let u = Vec2::new(random, unit_float(hash(i)));
                     let Some(sample) = light.sample(&to, u) else { continue };
                     let (Some(target), Some(pdf), Some((_, triangle))) =

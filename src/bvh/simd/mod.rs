@@ -115,6 +115,21 @@ pub trait Lanes:
     fn signs(self) -> u32;
     /// `a` where the bit is set, else `b`; the lowest bit is for the first lane.
     fn select(bits: u32, a: Self, b: Self) -> Self;
+    /// The sum of each lane and all before it, of at most sixteen: always added in the same order, in steps of 1, 2, 4 and 8 lanes.
+    #[inline(always)]
+    fn running_sums(self, proof: Self::Proof) -> Self {
+        let mut sums = [0.0; 16];
+        self.store(&mut sums);
+        let mut step = 1;
+        while step < Self::N {
+            let before = sums;
+            for i in step..Self::N {
+                sums[i] = before[i] + before[i - step];
+            }
+            step *= 2;
+        }
+        Self::load(proof, &sums)
+    }
 }
 
 /// Truth values of [`Lanes`].

@@ -108,6 +108,7 @@ macro_rules! lanes {
         $splat:ident $load:ident $store:ident $min:ident $max:ident $abs:expr, $lowest:expr, $highest:expr, $signs:expr;
         |$a:ident, $b:ident| $le:expr, $lt:expr, $eq:expr;
         |$bits:ident| $select:expr
+        $(; running_sums $running_sums:expr)?
     ) => {
         impl Lanes for $name {
             const N: usize = $n;
@@ -189,6 +190,14 @@ macro_rules! lanes {
                 // SAFETY: whoever has a vector had the proof that makes it.
                 Self(unsafe { $select })
             }
+            $(
+                #[inline(always)]
+                fn running_sums(self, _: $proof) -> Self {
+                    let $a = self.0;
+                    // SAFETY: whoever has a vector had the proof that makes it.
+                    Self(unsafe { $running_sums })
+                }
+            )?
         }
     };
 }
@@ -227,6 +236,13 @@ lanes!(
     _mm256_cmp_ps_mask::<_CMP_EQ_OQ>(a, b);
     |bits| _mm256_mask_blend_ps(bits as u8, b, a)
 );
+/// Sixteen lanes moved up by 16 less so many, zeros below.
+macro_rules! shifted {
+    ($left:literal, $a:expr) => {
+        _mm512_castsi512_ps(_mm512_alignr_epi32::<$left>(_mm512_castps_si512($a), _mm512_setzero_si512()))
+    };
+}
+
 lanes!(
     Sixteen, 16, Avx512, u16;
     _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_min_ps _mm512_max_ps
@@ -236,7 +252,13 @@ lanes!(
     _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b),
     _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
     _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a, b);
-    |bits| _mm512_mask_blend_ps(bits as u16, b, a)
+    |bits| _mm512_mask_blend_ps(bits as u16, b, a);
+    running_sums {
+        let a = _mm512_add_ps(a, shifted!(15, a));
+        let a = _mm512_add_ps(a, shifted!(14, a));
+        let a = _mm512_add_ps(a, shifted!(12, a));
+        _mm512_add_ps(a, shifted!(8, a))
+    }
 );
 pair_lanes!(Eight, 8);
 

@@ -5,8 +5,9 @@ use crate::trace::block::{Arrivals, Block, LANES};
 use crate::trace::connect::{Look, Shadow, looks, mesh_emission, power_heuristic, shadow_key};
 use crate::trace::emitter::Receiver;
 use crate::trace::integrator::Batch;
-use crate::trace::light::FlatLight;
+use crate::trace::light::{FlatLight, LightSample};
 use crate::trace::lights::Pick;
+use crate::trace::mesh_light::MeshLight;
 use crate::trace::path::{LIGHT, PAIRS_PER_BOUNCE};
 use crate::trace::quad_arrivals::{compute_quad, sample_quad};
 use crate::trace::sampler::SamplerRow;
@@ -42,6 +43,9 @@ impl Batch {
                         self.take_sampled(block, &samplers, light, depth, &arrivals);
                     }
                 }
+                FlatLight::Mesh(mesh) if mesh.is_many() => {
+                    self.light_mesh(scene, block, mesh, [light, dimension, depth]);
+                }
                 _ => {
                     let members = scene.light_samples(depth, Some(light));
                     let pick = Pick { light, chance: members as f32 };
@@ -60,6 +64,41 @@ impl Batch {
             }
         }
         self.diffuse.arrivals = arrivals;
+    }
+
+    /// Samples an emissive mesh, whose triangles are chosen for all points together.
+    fn light_mesh(
+        &mut self,
+        scene: &TraceScene,
+        block: &Block,
+        mesh: &MeshLight,
+        [light, dimension, depth]: [u32; 3],
+    ) {
+        let members = scene.light_samples(depth, Some(light));
+        let pick = Pick { light, chance: members as f32 };
+        let (mut wanted, mut chosen) = std::mem::take(&mut self.diffuse.choices);
+        let look = |i: usize, member: u32| {
+            let sampler = block.samplers.get(i).member([member, members]);
+            Look { pick, sampler, u: sampler.pair(dimension) }
+        };
+        wanted.clear();
+        for i in 0..block.count {
+            let to = Receiver { point: block.position.get(i), normal: block.normal.get(i) };
+            wanted.extend((0..members).map(|member| (to, look(i, member).u.x)));
+        }
+        chosen.clear();
+        chosen.resize(wanted.len(), None);
+        mesh.choose_all(&wanted, &mut chosen);
+        for (i, chosen) in chosen.chunks(members as usize).enumerate() {
+            for (member, chosen) in (0..).zip(chosen) {
+                let look = look(i, member);
+                let on = |chosen| mesh.sample_on(chosen, block.position.get(i), look.u.y);
+                if let Some(sample) = chosen.as_ref().and_then(on) {
+                    self.light_sample(scene, block, i, &look, &sample);
+                }
+            }
+        }
+        self.diffuse.choices = (wanted, chosen);
     }
 
     /// Samples lights that are chosen by chance, but for those that are known.
@@ -131,11 +170,24 @@ impl Batch {
 
     /// Samples any light for one point.
     fn light_point(&mut self, scene: &TraceScene, block: &Block, i: usize, look: &Look) {
-        let Look { pick: Pick { light, chance }, sampler, u } = *look;
+        let (position, normal) = (block.position.get(i), block.normal.get(i));
+        if let Some(sample) = scene.lights.get(look.pick.light).sample(position, normal, look.u) {
+            self.light_sample(scene, block, i, look, &sample);
+        }
+    }
+
+    /// Queues the shadow ray of a sample, with what it brings if nothing is in the way.
+    fn light_sample(
+        &mut self,
+        scene: &TraceScene,
+        block: &Block,
+        i: usize,
+        look: &Look,
+        sample: &LightSample,
+    ) {
+        let Look { pick: Pick { light, chance }, sampler, .. } = *look;
         let path = self.path(block.paths[i] as usize);
-        let (position, normal, geometric) =
-            (block.position.get(i), block.normal.get(i), block.geometric_normal.get(i));
-        let Some(sample) = scene.lights.get(light).sample(position, normal, u) else { return };
+        let (normal, geometric) = (block.normal.get(i), block.geometric_normal.get(i));
         let cosine = normal.dot(sample.wi);
         if cosine <= 0.0 || geometric.dot(sample.wi) <= 0.0 {
             return;
@@ -153,7 +205,7 @@ impl Batch {
         };
         let mut contribution = block.throughput.get(i) * sample.radiance * weight;
         if let Some((instance, triangle)) = sample.triangle {
-            contribution *= mesh_emission(scene, instance, triangle, &sample);
+            contribution *= mesh_emission(scene, instance, triangle, sample);
         }
         if contribution == Vec3::ZERO {
             return;

@@ -9,6 +9,7 @@ use super::bsdf::normal::facing;
 use super::emitter::Receiver;
 use super::film::{TILE, Tile};
 use super::integrator::Batch;
+use super::light_tree::Chosen;
 use super::lights::KNOWN_LIGHTS;
 use super::path::{Bounce, DIRECTION, LOBE, PAIRS_PER_BOUNCE, Path, ROULETTE_DEPTH};
 use super::reuse::{End, Start};
@@ -35,6 +36,8 @@ pub(super) struct Diffuse {
     asked: Vec<((u32, u32), Option<u32>)>,
     /// Lights that have been counted in full, a bit for each, of each point of the block.
     counted: Vec<u32>,
+    /// Triangles of an emissive mesh that are chosen for a block: by which numbers, and which.
+    choices: (Vec<(Receiver, f32)>, Vec<Option<Chosen>>),
     block: Option<Box<Block>>,
     arrivals: Box<Arrivals>,
     departures: Box<Departures>,

@@ -1,86 +1,184 @@
 //! Nodes of a [`super::LightTree`], and what they look like from a point.
 
+use crate::bvh::simd::{Lanes, Mask, Simd};
 use crate::trace::emitter::{Emitter, Receiver};
-use glam::Vec3;
 use std::ops::Range;
 
-/// What the way down needs of emitters together.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Children of a node at most.
+pub(super) const WIDTH: usize = 16;
+/// One number of each child.
+pub(super) type Row = [f32; WIDTH];
+
+/// What the way down needs of the children of a node; those that it does not have are zeros.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[repr(align(64))]
 pub(super) struct Node {
-    /// Of the ball around their box.
-    center: Vec3,
-    radius: f32,
-    axis: Vec3,
-    cos_spread: f32,
-    sin_spread: f32,
-    intensity: f32,
-    /// First of two children.
-    pub(super) child: u32,
-    /// Its emitters' places in the order of the tree; a leaf has one.
+    /// Of the ball around the box of each; the inverse is of four times its radius.
+    center: [Row; 3],
+    radius: Row,
+    inverse: Row,
+    /// [`super::Sides`], in parts of the intensity of all: squares without their weight.
+    weight: Row,
+    squares: [Row; 6],
+    front: [Row; 3],
+    /// Part of the intensity of all; equal parts of nothing.
+    share: Row,
+    /// What they are chosen by if nothing is known of what is in between. And sums of these.
+    blind: Row,
+    blinds: Row,
+    /// From so far on, and so high above the horizon, nothing is to be chosen in a child but by intensity; if as much leaves it as
+    /// `facing`.
+    far: Row,
+    facing: Row,
+    pub(super) children: [Child; WIDTH],
+    /// The node above, and which of its children this is.
+    pub(super) parent: (u32, u32),
+}
+
+/// Where a child leads.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Child {
+    /// Its emitters' places in the order of the tree.
     pub(super) first: u32,
     pub(super) count: u32,
+    /// Its own node, if it has more than one.
+    pub(super) node: u32,
+}
+
+/// What the children of a node bring to a point.
+pub(super) struct Seen {
+    /// How far above the horizon they are, and how much they send here, times their distance.
+    height: Row,
+    sent: Row,
+    brought: Row,
+    /// Of each and all before it.
+    sums: Row,
+    /// What to weigh that by, and what is chosen blindly, so that there is 1 in all.
+    seeing: f32,
+    blind: f32,
+}
+
+/// Emitters together, some or one.
+pub(super) struct Group {
+    pub(super) all: Emitter,
     /// They shine to the same sides, more or less.
-    alike: bool,
+    pub(super) alike: bool,
+    pub(super) places: Range<usize>,
 }
 
 /// Nodes of emitters that are alike, farther than so many times the radius of their ball and as far above the horizon, are not
 /// looked into: among those their intensity decides.
 const FAR: f32 = 6.0;
-/// A node as seen from a point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Prospect {
-    /// What it could bring if nothing is in between; by bounds of angles, but the distance of its middle.
-    pub(super) importance: f32,
-    pub(super) is_far: bool,
-}
+/// What they are expected to bring does not know what is in between: so often their intensity and their number decide alike.
+const BLIND: f32 = 0.2;
 
 impl Node {
-    pub(super) fn new(all: &Emitter, alike: bool, child: usize, places: Range<usize>) -> Self {
-        let half = (all.bounds.max - all.bounds.min) * 0.5;
-        let (sin_spread, cos_spread) = all.spread.sin_cos();
-        Self {
-            center: all.bounds.center(),
-            radius: half.length(),
-            axis: all.axis,
-            cos_spread,
-            sin_spread,
-            intensity: all.intensity,
-            child: child as u32,
-            first: places.start as u32,
-            count: places.len() as u32,
-            alike: alike && all.intensity > 0.0,
+    /// Of these, with the intensity of each in all.
+    pub(super) fn new(groups: &[(&Group, f64)], parent: (u32, u32)) -> Self {
+        let mut node = Self { parent, ..Self::default() };
+        let sum: f64 = groups.iter().map(|(_, intensity)| intensity).sum();
+        let count: usize = groups.iter().map(|(group, _)| group.places.len()).sum();
+        let mut blinds = 0.0;
+        for (i, &(Group { all, alike, places }, intensity)) in groups.iter().enumerate() {
+            let share = intensity / sum;
+            let share = if share.is_finite() { share as f32 } else { 1.0 / groups.len() as f32 };
+            let blind = 0.5 * (share + places.len() as f32 / count as f32);
+            blinds += blind;
+            (node.share[i], node.blind[i], node.blinds[i]) = (share, blind, blinds);
+            let (center, radius) = (all.bounds.center(), ((all.bounds.max - all.bounds.min) * 0.5).length());
+            (node.radius[i], node.inverse[i]) = (radius, 0.25 / radius.max(f32::MIN_POSITIVE));
+            let sides = all.sides;
+            let part =
+                |of: f32, whole: f32| if whole > 0.0 && whole < f32::INFINITY { of / whole } else { 0.0 };
+            node.weight[i] = share * part(sides.weight, all.intensity);
+            for (row, square) in node.squares.iter_mut().zip(sides.squares) {
+                row[i] = part(square, sides.weight);
+            }
+            for axis in 0..3 {
+                node.center[axis][i] = center[axis];
+                node.front[axis][i] = share * part(sides.front[axis], all.intensity);
+            }
+            (node.far[i], node.facing[i]) = match places.len() {
+                1 => (f32::NEG_INFINITY, f32::NEG_INFINITY),
+                _ if *alike && intensity > 0.0 => (FAR * radius, FAR * radius * share),
+                _ => (f32::INFINITY, f32::INFINITY),
+            };
+            node.children[i] = Child { first: places.start as u32, count: places.len() as u32, node: 0 };
         }
+        // For the sums of children that are not there.
+        node.blinds[groups.len()..].fill(blinds);
+        node
     }
 
-    /// Without branches: which way they go nobody can foresee.
+    /// How children are chosen at a point.
     #[inline(always)]
-    pub(super) fn from(&self, to: &Receiver) -> Prospect {
+    pub(super) fn seen<S: Simd>(&self, simd: S, to: &Receiver) -> Seen {
+        let zeros = [0.0; WIDTH];
+        let mut seen =
+            Seen { height: zeros, sent: zeros, brought: zeros, sums: zeros, seeing: 0.0, blind: 1.0 };
+        for i in 0..WIDTH {
+            (seen.height[i], seen.sent[i], seen.brought[i]) = self.brought(i, to);
+        }
+        S::F16::load(simd, &seen.brought).running_sums(simd).store(&mut seen.sums);
+        let seeing = (1.0 - BLIND) / seen.sums[WIDTH - 1];
+        // Not where none is expected to bring anything, or one is infinitely near.
+        if (seeing > 0.0) & (seeing < f32::INFINITY) {
+            (seen.seeing, seen.blind) = (seeing, BLIND);
+        }
+        seen
+    }
+
+    /// The chance of a child.
+    #[inline(always)]
+    pub(super) fn chance(&self, seen: &Seen, child: usize) -> f32 {
+        seen.brought[child] * seen.seeing + self.blind[child] * seen.blind
+    }
+
+    /// Which child a number in [0, 1) means, the chance of that, and what is left of the number.
+    #[inline(always)]
+    pub(super) fn choose<S: Simd>(&self, simd: S, seen: &Seen, random: f32) -> (usize, f32, f32) {
+        let row = |row: &Row| S::F16::load(simd, row);
+        let weight = |x: f32| S::F16::splat(simd, x);
+        let ends = row(&seen.sums) * weight(seen.seeing) + row(&self.blinds) * weight(seen.blind);
+        let end = |i: usize| seen.sums[i] * seen.seeing + self.blinds[i] * seen.blind;
+        let wanted = random * end(WIDTH - 1);
+        let child = ends.le(weight(wanted)).bits().count_ones() as usize;
+        let child = child.min(WIDTH - 1);
+        let chance = self.chance(seen, child);
+        (child, chance, (wanted - (end(child) - chance)) / chance)
+    }
+
+    /// How far above the horizon a child is; what it sends here, times its distance; and what it brings if nothing is in between,
+    /// nearly. Without branches: which way they go nobody can foresee.
+    #[inline(always)]
+    fn brought(&self, i: usize, to: &Receiver) -> (f32, f32, f32) {
         let select = |which: bool, yes: f32, no: f32| if which { yes } else { no };
-        let along = self.center - to.point;
-        let distance2 = along.length_squared();
-        let radius2 = self.radius * self.radius;
+        let [x, y, z] =
+            [self.center[0][i] - to.point.x, self.center[1][i] - to.point.y, self.center[2][i] - to.point.z];
+        let distance2 = x * x + y * y + z * z;
+        let radius = self.radius[i];
         // From inside of the ball around them, they may be anywhere.
-        let is_outside = distance2 > radius2;
-        let inverse = 1.0 / distance2.max(radius2).max(f32::MIN_POSITIVE);
-        let clear = (distance2 - radius2).max(0.0).sqrt();
-        // Sines and cosines times the distance: of the angles to the middle, and then of those less the ball's angle, if they are
-        // larger.
-        let sine = |cosine: f32| (distance2 - cosine * cosine).max(0.0).sqrt();
-        let nearest = |sine: f32, cosine: f32| {
-            let is_beyond = is_outside & (sine * clear > cosine * self.radius);
-            select(is_beyond, (cosine * clear + sine * self.radius) * inverse, 1.0)
-        };
-        let height = to.normal.dot(along);
-        let arrives = nearest(sine(height), height);
-        let front = -self.axis.dot(along);
-        let side = sine(front);
-        let beyond = side * self.cos_spread - front * self.sin_spread;
-        let leaves = nearest(beyond, front * self.cos_spread + side * self.sin_spread);
-        let leaves = select(beyond > 0.0, leaves, 1.0);
+        let inverse = 1.0 / distance2.max(radius * radius).max(1e-30);
+        let [xx, yy, zz, yz, zx, xy] = &self.squares;
+        let squares = x * (x * xx[i] + y * (2.0 * xy[i]))
+            + y * (y * yy[i] + z * (2.0 * yz[i]))
+            + z * (z * zz[i] + x * (2.0 * zx[i]));
+        let front = self.front[0][i] * x + self.front[1][i] * y + self.front[2][i] * z;
+        let sent = self.weight[i] * squares.max(0.0).sqrt() - front;
+        let height = to.normal.x * x + to.normal.y * y + to.normal.z * z;
+        // The mean over the ball of what is above the horizon, if all heights were as frequent.
+        let above = height + radius;
+        let straddling = above * above * self.inverse[i];
+        let mean = select(height >= radius, height, select(above > 0.0, straddling, 0.0));
         // Never quite dark: what shines through a surface arrives from behind, and rounding must not decide.
-        let importance = self.intensity * leaves.max(0.01) * arrives.max(0.05) * inverse;
-        let far = FAR * self.radius;
-        let is_far = self.alike & (height > far) & ((front > far) | (self.axis == Vec3::ZERO));
-        Prospect { importance, is_far }
+        let arriving = mean.max(0.05 * height.abs());
+        let sending = sent.max(0.05 * self.share[i] * radius);
+        (height, sent, sending * arriving * inverse * inverse)
+    }
+
+    /// Whether nothing is to be chosen in a child but by intensity.
+    #[inline(always)]
+    pub(super) fn is_end(&self, i: usize, seen: &Seen) -> bool {
+        (seen.height[i] > self.far[i]) & (seen.sent[i] > self.facing[i])
     }
 }
