@@ -6,6 +6,7 @@ use crate::first_look;
 use crate::image::{Display, ToneMap};
 use crate::load::{
     Card, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
+    load_unedited,
 };
 use crate::scene::{
     ActiveCamera, Aspect, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform,
@@ -108,7 +109,8 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let start = Instant::now();
     let resolution = options.resolution.or(wishes.size.map(|size| size.to_array()));
     let mut options = LoadOptions { resolution, ..options.clone() };
-    let (mut app, mut report) = App::open(source, &options, RenderSettings::default())?;
+    let mut app = App::new(RenderSettings::default());
+    let (mut report, edits) = load_unedited(&mut app.world, source, &options)?;
     choose_camera(&mut app.world, &report, &source.name(), wishes)?;
     let file = &report.render;
     let default = RenderSettings::default();
@@ -140,7 +142,8 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     // Loaded again in a window of another shape, a camera of our own stands where it stood.
     options.resolution = Some(settings.size.to_array());
     let (camera, pose) = (wishes.camera.clone(), wishes.pose);
-    app.world.insert_resource(SceneOrigin { source: source.clone(), options, camera, pose });
+    let origin = SceneOrigin { source: source.clone(), options: options.clone(), camera, pose };
+    app.world.insert_resource(origin);
     if let Some(origin) = report.render.origin {
         app.world.insert_resource(RenderOrigin(Some(origin.into())));
     }
@@ -157,6 +160,11 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let start = Instant::now();
     app.build();
     first_look::settle(&mut app, &mut report, &source.to_string(), exposure.is_none());
+    if !edits.is_empty() {
+        // Light and exposure are those that whoever edited it had before him, also where he has put out a lamp.
+        edits.apply(&mut app.world, &options, &mut report)?;
+        app.build();
+    }
     let build_seconds = start.elapsed().as_secs_f64();
     let card = Card::of(&source.to_string(), &report).text();
     app.world.insert_resource(LoadCard { text: card.into(), warnings: report.warnings().len() });
