@@ -5,7 +5,8 @@ use crate::bvh::Isa;
 use crate::first_look;
 use crate::image::{Display, ToneMap};
 use crate::load::{
-    Card, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
+    Card, Kind, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
+    load_unedited,
 };
 use crate::scene::{
     ActiveCamera, Aspect, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform,
@@ -15,6 +16,7 @@ use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,6 +25,8 @@ use std::time::Instant;
 pub struct Wishes {
     /// Width and height in pixels.
     pub size: Option<UVec2>,
+    /// The part of it that alone is wanted: from its first pixel to the one after its last.
+    pub crop: Option<[UVec2; 2]>,
     /// Samples per pixel.
     pub samples: Option<u32>,
     /// Index of the first sample; 0 if not said.
@@ -74,6 +78,15 @@ pub enum OpenError {
     /// The scene cannot be loaded.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// A part that is not all in the picture.
+    #[error("--crop {},{},{},{} is not in the picture, which is {size}: X + W and Y + H may be no more than that",
+             crop[0].x, crop[0].y, crop[1].x - crop[0].x, crop[1].y - crop[0].y)]
+    Crop {
+        /// What was asked for.
+        crop: [UVec2; 2],
+        /// Width and height of the picture, as `WxH`.
+        size: String,
+    },
     /// No such camera.
     #[error("{scene}: no camera \"{wanted}\"; it has {names}")]
     Camera {
@@ -103,12 +116,13 @@ pub struct Opened {
 /// Loads `source` and applies `wishes`.
 ///
 /// # Errors
-/// If the scene cannot be loaded or has no such camera.
+/// If the scene cannot be loaded, has no such camera, or its picture no such part.
 pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Result<Opened, OpenError> {
     let start = Instant::now();
     let resolution = options.resolution.or(wishes.size.map(|size| size.to_array()));
     let mut options = LoadOptions { resolution, ..options.clone() };
-    let (mut app, mut report) = App::open(source, &options, RenderSettings::default())?;
+    let mut app = App::new(RenderSettings::default());
+    let (mut report, edits) = load_unedited(&mut app.world, source, &options)?;
     choose_camera(&mut app.world, &report, &source.name(), wishes)?;
     let file = &report.render;
     let default = RenderSettings::default();
@@ -135,32 +149,63 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
         light_samples: default.light_samples,
         reuse: default.reuse,
     };
+    if let Some(crop) = wishes.crop.filter(|[_, max]| max.cmpgt(settings.size).any()) {
+        return Err(OpenError::Crop { crop, size: format!("{}x{}", settings.size.x, settings.size.y) });
+    }
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);
     // Loaded again in a window of another shape, a camera of our own stands where it stood.
     options.resolution = Some(settings.size.to_array());
     let (camera, pose) = (wishes.camera.clone(), wishes.pose);
-    app.world.insert_resource(SceneOrigin { source: source.clone(), options, camera, pose });
+    let origin = SceneOrigin { source: source.clone(), options: options.clone(), camera, pose };
+    app.world.insert_resource(origin);
     if let Some(origin) = report.render.origin {
         app.world.insert_resource(RenderOrigin(Some(origin.into())));
+    }
+    if options.scene_settings.is_none()
+        && options.edits.is_none()
+        && let Some(told) = edits_beside(source)
+    {
+        report.add(Kind::Decided, &source.to_string(), told);
     }
     app.world.insert_resource(settings);
     app.world.insert_resource(Instructions(wishes.isa.unwrap_or_default()));
     app.world.insert_resource(Film::new(settings.size, wishes.first_sample.unwrap_or(0)));
     let tone_map = wishes.tone_map.unwrap_or_default();
     app.world.insert_resource(Display { exposure: exposure.unwrap_or_default(), tone_map });
-    if let Some(samples) = samples {
-        app.world.resource_mut::<FrameBudget>().sample_target = samples;
-    }
+    let mut budget = app.world.resource_mut::<FrameBudget>();
+    budget.sample_target = samples.unwrap_or(budget.sample_target);
+    budget.region = wishes.crop;
     let load_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
     app.build();
     first_look::settle(&mut app, &mut report, &source.to_string(), exposure.is_none());
+    if !edits.is_empty() {
+        // Light and exposure are those that whoever edited it had before him, also where he has put out a lamp.
+        edits.apply(&mut app.world, &options, &mut report)?;
+        app.build();
+    }
     let build_seconds = start.elapsed().as_secs_f64();
     let card = Card::of(&source.to_string(), &report).text();
     app.world.insert_resource(LoadCard { text: card.into(), warnings: report.warnings().len() });
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
+}
+
+/// What to say of edits that were saved beside the scene: they are applied only if somebody asks for them.
+fn edits_beside(source: &SceneSource) -> Option<String> {
+    let SceneSource::File(scene) = source else { return None };
+    let stem = format!("{}.edits_", source.name());
+    let number = |name: &str| name.strip_prefix(&stem)?.strip_suffix(".toml")?.parse::<u32>().ok();
+    let folder = scene.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let names =
+        std::fs::read_dir(folder).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut numbers: Vec<u32> = names.filter_map(|name| number(&name)).collect();
+    numbers.sort_unstable();
+    let newest = folder.join(format!("{stem}{}.toml", numbers.last()?));
+    let newest = newest.strip_prefix(".").unwrap_or(&newest).display();
+    let which = if numbers.len() > 1 { format!(" (the last of {})", numbers.len()) } else { String::new() };
+    Some(format!("edits saved beside it are not applied: --scene-settings {newest} does that{which}"))
 }
 
 /// A size of this width over height with as many pixels as `usual`, but no higher than a screen.

@@ -3,7 +3,7 @@
 use crate::app::{FrameBudget, FrameStats};
 use crate::farm::{self, FilmError, FilmFile, Header, Identity, is_film};
 use crate::image::compare::{CompareError, LinearImage};
-use crate::image::files::save_image;
+use crate::image::files::{save_image, save_part};
 use crate::image::{Display, ErrorLog, ImageError, save};
 use crate::load::{Kind, LoadOptions, Phase, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
@@ -55,6 +55,11 @@ pub enum RenderError {
     /// A film cannot be gone on with, or not serve as reference.
     #[error(transparent)]
     Film(#[from] FilmError),
+    /// What is of the whole picture only.
+    #[error(
+        "--crop is for .png and .exr: a film, --resume and --reference are of the whole picture; leave it out, or them"
+    )]
+    OfAPart,
     /// The reference is of another size.
     #[error(transparent)]
     Reference(#[from] CompareError),
@@ -92,6 +97,8 @@ pub struct RenderSummary {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// The part that is in the files, of these pixels: from the left, from the top, width and height.
+    pub crop: Option<[u32; 4]>,
     /// `direct` or `path`.
     pub integrator: &'static str,
     /// Bounces at most.
@@ -165,8 +172,11 @@ pub fn render(
 ) -> Result<RenderSummary, RenderError> {
     let start = Instant::now();
     job.outputs.iter().try_for_each(|path| folder_exists(path))?;
-    let mut scene = open(&job.source, &job.load, &job.wishes)?;
     let films = job.resume.is_some() || job.outputs.iter().any(|path| is_film(path));
+    if job.wishes.crop.is_some() && (films || job.error_log.is_some()) {
+        return Err(RenderError::OfAPart);
+    }
+    let mut scene = open(&job.source, &job.load, &job.wishes)?;
     let identity = films.then(|| Identity::of(&scene.app.world, job.source.name()));
     let (mut planned, mut resumed_samples) = (None, 0.0);
     if let (Some(path), Some(identity)) = (&job.resume, &identity) {
@@ -192,8 +202,11 @@ pub fn render(
     let first_sample = app.world.resource::<Film>().first_sample();
     let target = target.min(u32::MAX - first_sample);
 
+    let region = app.world.resource::<FrameBudget>().region;
     app.world.insert_resource(FrameBudget {
-        adaptive: open_end && asked.is_none() && !films && !job.even,
+        // Shares are of whole pictures.
+        adaptive: open_end && asked.is_none() && !films && !job.even && region.is_none(),
+        region,
         limit: job.time_limit,
         interrupt: Arc::clone(&job.interrupt),
         ..FrameBudget::default()
@@ -267,7 +280,10 @@ pub fn render(
         .then(|| first_sample..first_sample + target.max(film.complete_samples()));
     let display = *app.world.resource::<Display>();
     let header = identity.map(|identity| Header::new(identity, planned, &display));
-    save_all(&job.outputs, (film, guess.as_ref()), &display, header.as_ref())?;
+    match region {
+        Some(part) => each(&job.outputs, |path| save_part(path, film, &display, part))?,
+        None => save_all(&job.outputs, (film, guess.as_ref()), &display, header.as_ref())?,
+    }
     if let Some(trouble) = watch.trouble {
         return Err(trouble.into());
     }
@@ -278,6 +294,7 @@ pub fn render(
         version: env!("CARGO_PKG_VERSION"),
         width: settings.size.x,
         height: settings.size.y,
+        crop: region.map(|[min, max]| [min.x, min.y, max.x - min.x, max.y - min.y]),
         integrator: settings.integrator.name(),
         max_depth: settings.max_depth,
         seed: settings.seed,
@@ -376,6 +393,10 @@ pub fn save_all(
         }
         _ => guess.map_or_else(|| save(path, film, display), |guess| save_image(path, guess, display)),
     };
+    each(paths, save)
+}
+
+fn each(paths: &[PathBuf], save: impl Fn(&PathBuf) -> Result<(), ImageError>) -> Result<(), ImageError> {
     let done: Vec<Result<(), ImageError>> = paths.iter().map(save).collect();
     done.into_iter().collect()
 }

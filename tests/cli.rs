@@ -119,6 +119,13 @@ fn exit_codes_are_those_of_the_documentation() {
         (vec!["render", "cornell", "--camera", "nobody", "-o", "a.png"], 2, vec!["nobody"]),
         (vec!["render", "cornell", "--resolution", "0x0"], 2, vec!["0x0"]),
         (vec!["render", "--sppp", "1"], 2, vec!["--spp"]),
+        (
+            vec!["render", "cornell", "--resolution", "9x9", "--crop", "3,3,7,2"],
+            2,
+            vec!["--crop 3,3,7,2", "9x9"],
+        ),
+        (vec!["render", "cornell", "--crop", "3,3,7"], 2, vec!["X,Y,W,H"]),
+        (vec!["render", "cornell", "--crop", "0,0,7,7", "-o", "a.film"], 2, vec!["--crop", "film"]),
         (vec!["render", "cornell", "-o", "no/such/folder/a.png"], 1, vec!["no/such/folder/a.png"]),
         (vec!["compare", "no.png", "no.exr"], 1, vec!["no.png"]),
     ] {
@@ -154,6 +161,35 @@ fn sample_ranges_are_the_samples_of_the_whole() {
     for ((whole, first), rest) in whole.iter().zip(&first).zip(&rest) {
         let merged = (f64::from(*first) * 4.0 + f64::from(*rest) * 8.0) / 12.0;
         assert!((merged - f64::from(*whole)).abs() <= 1e-6 * merged.max(1e-3), "{merged} {whole}");
+    }
+}
+
+#[test]
+fn a_crop_is_that_part_of_the_whole_picture() {
+    let folder = fresh("crop");
+    let picture = |name: &str, flags: &[&str]| {
+        let arguments = ["render", "cornell", "--resolution", "64x48", "--spp", "4", "-q", "--json", "-o"];
+        let output = penumbra(&folder, &[&arguments, &[name][..], flags].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (image::open(folder.join(name)).unwrap().into_rgb32f(), json)
+    };
+    for integrator in ["direct", "path"] {
+        for ending in ["png", "exr"] {
+            let flags = ["--integrator", integrator];
+            let (whole, json) = picture(&format!("whole.{ending}"), &flags);
+            assert_eq!(json["crop"], Value::Null);
+            // Neither begins nor ends where tiles do.
+            let (part, json) =
+                picture(&format!("part.{ending}"), &[&flags[..], &["--crop", "19,7,22,30"]].concat());
+            assert_eq!(json["crop"], serde_json::json!([19, 7, 22, 30]));
+            assert_eq!(part.dimensions(), (22, 30));
+            assert!(
+                part == image::imageops::crop_imm(&whole, 19, 7, 22, 30).to_image(),
+                "{integrator} {ending}"
+            );
+            assert!(part.pixels().any(|pixel| pixel[0] > 0.1), "something is seen");
+        }
     }
 }
 

@@ -1,10 +1,12 @@
 //! What is decided by a small picture of the scene: light and exposure.
 
-use glam::UVec2;
+use bevy_ecs::prelude::Entity;
+use glam::{UVec2, Vec3};
 use penumbra::image::Display;
 use penumbra::load::{LoadOptions, LoadReport, SceneSource};
-use penumbra::open::{Opened, Pose, Wishes, open};
-use penumbra::scene::Light;
+use penumbra::open::{Opened, Pose, SceneOrigin, Wishes, open};
+use penumbra::scene::path::path_of;
+use penumbra::scene::{Instance, Light, Material};
 use penumbra::trace::RenderSettings;
 use std::path::Path;
 
@@ -135,4 +137,30 @@ fn the_picture_has_the_shape_that_the_files_camera_asks_for() {
     let wishes = Wishes { size: Some(UVec2::new(64, 48)), ..Wishes::default() };
     assert_eq!(size(&perspective(r#","aspectRatio":1"#), &wishes), UVec2::new(64, 48));
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn what_is_edited_changes_nothing_that_was_decided_before() {
+    let mut scene = opened("edited", &floor_and_lamp(1.0), &MTL.replace("Ke 5 5 5", "Ke 5000 5000 5000"));
+    let exposure = scene.app.world.resource::<Display>().exposure;
+    assert!(exposure < -6.0, "{exposure}");
+    let world = &mut scene.app.world;
+    let (entity, instance) = world.query::<(Entity, &Instance)>().iter(world).next().unwrap();
+    let shines =
+        |&material: &Entity| world.get::<Material>(material).is_some_and(|m| m.emission != Vec3::ZERO);
+    let slot = instance.materials.iter().position(shines).unwrap();
+    let path = path_of(world, entity);
+    // Dimmed, and put out: nobody is given another light or exposure for it.
+    for emission in ["[1, 1, 1]", "[0, 0, 0]"] {
+        let edits =
+            format!("[[edit]]\nentity = {path:?}\nslot = {slot}\nmaterial = {{ emission = {emission} }}\n");
+        let options = LoadOptions { edits: Some(edits), ..LoadOptions::default() };
+        let source = scene.app.world.resource::<SceneOrigin>().source.clone();
+        let mut edited = open(&source, &options, &Wishes::default()).unwrap();
+        assert!(edited.report.warnings().is_empty(), "{:?}", edited.report.warnings());
+        let mut materials = edited.app.world.query::<&Material>();
+        assert!(materials.iter(&edited.app.world).all(|material| material.emission.x < 2.0), "it is edited");
+        assert_eq!(lights(&mut edited), 0, "{emission}");
+        assert_eq!(edited.app.world.resource::<Display>().exposure, exposure, "{emission}");
+    }
 }

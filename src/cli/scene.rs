@@ -2,7 +2,7 @@
 
 use super::choices::{FilterArg, IntegratorArg, SamplingArg, ToneMapArg};
 use super::render::OutputArgs;
-use super::values::{bytes, exposure, isa, length, radius, resolution, time, vector, view_angle};
+use super::values::{bytes, crop, exposure, isa, length, radius, resolution, time, vector, view_angle};
 use crate::bvh::Isa;
 use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
@@ -31,6 +31,9 @@ pub struct SceneArgs {
     /// Size of the picture
     #[arg(long, value_name = "WxH", value_parser = resolution)]
     pub resolution: Option<UVec2>,
+    /// Only this part of the picture: W by H pixels, the first of them X from its left and Y from its top
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
+    pub crop: Option<[UVec2; 2]>,
     /// Samples per pixel
     #[arg(long, visible_alias = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
@@ -153,6 +156,7 @@ impl SceneArgs {
         let range = output.sample_range.clone();
         Wishes {
             size: self.resolution,
+            crop: self.crop,
             samples: range.as_ref().map(|r| r.end - r.start).or(self.spp),
             first_sample: range.map(|r| r.start),
             integrator: self.integrator.map(Into::into),

@@ -24,6 +24,18 @@ pub(super) fn resolution(text: &str) -> Result<UVec2, String> {
     Ok(size)
 }
 
+/// The first pixel, and the one after the last.
+pub(super) fn crop(text: &str) -> Result<[UVec2; 2], String> {
+    let wrong = || format!("\"{text}\" is not a part such as 320,200,64,48: X,Y,WIDTH,HEIGHT in pixels");
+    let numbers: Vec<u32> =
+        text.split([',', 'x']).map(|s| s.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    let [x, y, width, height] = *numbers.as_slice() else { return Err(wrong()) };
+    let (Some(right), Some(bottom)) = (x.checked_add(width), y.checked_add(height)) else {
+        return Err(wrong());
+    };
+    if width.min(height) > 0 { Ok([UVec2::new(x, y), UVec2::new(right, bottom)]) } else { Err(wrong()) }
+}
+
 pub(super) fn vector(text: &str) -> Result<DVec3, String> {
     let wrong = || format!("\"{text}\" is not a vector such as 1,2.5,-3");
     let numbers: Vec<f64> =
@@ -112,6 +124,10 @@ mod tests {
         assert_eq!(vector("-1, 2.5,3e1"), Ok(DVec3::new(-1.0, 2.5, 30.0)));
         assert_eq!(sample_range("16..64"), Ok(16..64));
         assert_eq!(seconds("1.5s"), Ok(Duration::from_millis(1500)));
+        assert_eq!(crop("8, 0,4,300"), Ok([UVec2::new(8, 0), UVec2::new(12, 300)]));
+        for wrong in ["8,0,4", "8,0,0,3", "-8,0,4,3", "1,2,3,4,5", "4294967295,0,1,1", ""] {
+            assert!(crop(wrong).is_err(), "{wrong}");
+        }
         for wrong in ["0x5", "5", "ax3", "65536x65536"] {
             assert!(resolution(wrong).is_err(), "{wrong}");
         }

@@ -97,6 +97,29 @@ pub fn save_image(path: &Path, image: &LinearImage, display: &Display) -> Result
     }
 }
 
+/// The same of the part of it from its first pixel to the one after its last: the very pixels of the whole picture.
+///
+/// # Errors
+/// If the ending is unknown or the file cannot be written.
+pub fn save_part(path: &Path, film: &Film, display: &Display, part: [UVec2; 2]) -> Result<(), ImageError> {
+    let size = film.size();
+    let [min, max] = part.map(|corner| corner.min(size));
+    match PictureFormat::of(path)? {
+        PictureFormat::Png => {
+            let bytes = develop(film, None, display);
+            let pixels: Vec<[u8; 4]> = bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
+            write_png(path, max - min, cut(&pixels, size.x, [min, max]).into_flattened())
+        }
+        PictureFormat::Exr => write_exr(path, max - min, &cut(&linear_pixels(film), size.x, [min, max])),
+    }
+}
+
+/// Of rows of `width` pixels, those between two corners.
+fn cut<T: Copy>(pixels: &[T], width: u32, [min, max]: [UVec2; 2]) -> Vec<T> {
+    let rows = pixels.chunks_exact(width as usize).take(max.y as usize).skip(min.y as usize);
+    rows.flat_map(|row| &row[min.x as usize..max.x as usize]).copied().collect()
+}
+
 /// The film as it is shown, as a PNG that knows its `recipe`.
 ///
 /// # Errors

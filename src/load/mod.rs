@@ -44,7 +44,7 @@ use bevy_ecs::prelude::*;
 use bevy_ecs::system::RunSystemOnce;
 use glam::Vec3;
 use report::Sink;
-use settings::{Materials, Model, Settings};
+use settings::{Edits, Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -145,7 +145,7 @@ pub struct LoadOptions {
 /// A [`LoadError`] that names the file and the place in it; then nothing was added to the world.
 pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> Result<LoadReport, LoadError> {
     let mut sink = Sink::new(world, options);
-    match load_into(source, options, &mut sink) {
+    match load_into(source, options, &mut sink).and_then(|edits| edits.make(&mut sink)) {
         Ok(()) => Ok(sink.finish(&source.to_string())),
         Err(error) => {
             sink.undo();
@@ -154,10 +154,26 @@ pub fn load(world: &mut World, source: &SceneSource, options: &LoadOptions) -> R
     }
 }
 
-fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+/// The same as its files have it, and what was edited in it: to be applied when all else is decided.
+pub(crate) fn load_unedited(
+    world: &mut World,
+    source: &SceneSource,
+    options: &LoadOptions,
+) -> Result<(LoadReport, Edits), LoadError> {
+    let mut sink = Sink::new(world, options);
+    match load_into(source, options, &mut sink) {
+        Ok(edits) => Ok((sink.finish(&source.to_string()), edits)),
+        Err(error) => {
+            sink.undo();
+            Err(error)
+        }
+    }
+}
+
+fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -> Result<Edits, LoadError> {
     if let SceneSource::Made(made) = source {
         make(made, sink);
-        return Ok(());
+        return Ok(Edits::default());
     }
     let (file, folder, bytes) = open(source, sink)?;
     let format = Format::of(&file, &bytes)?;
@@ -210,13 +226,9 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
     }
     sink.count();
     framing::complete(&file, active, sink);
-    // After the animations, so that what is moved by hand stands where it was put; and after all that is decided by the scene's
-    // extent and lights, since who edits it has those before his eyes.
-    for settings in &settings {
-        settings.apply_edits(sink)?;
-    }
-    pose(sink.world);
-    Ok(())
+    let edits = Edits(settings);
+    sink.report.render.origin = edits.origin();
+    Ok(edits)
 }
 
 /// What needs no file. Nothing can go wrong.

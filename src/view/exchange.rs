@@ -2,8 +2,7 @@
 
 use super::controls::{Notice, Notices};
 use super::debug::layer::Layer;
-use super::keymap::Tap;
-use super::plain::Plain;
+use super::plain::{Plain, Shot};
 use super::sides::Compared;
 use super::status::Status;
 use crate::app::App;
@@ -21,7 +20,7 @@ pub enum Wake {
     /// The engine's thread panicked.
     Crashed(String),
     /// The picture of the film alone that this key asked for.
-    Plain(Tap, Picture),
+    Plain(Shot),
     /// Something to show to the user.
     Notice(String),
     /// What the user wanted to open could not be, and why.
@@ -70,8 +69,8 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Passes the frame's notices on.
 pub fn say(app: &mut App, wake: &impl Fn(Wake)) {
-    for (tap, picture) in std::mem::take(&mut app.world.resource_mut::<Plain>().0) {
-        wake(Wake::Plain(tap, picture));
+    for shot in std::mem::take(&mut app.world.resource_mut::<Plain>().0) {
+        wake(Wake::Plain(shot));
     }
     for notice in std::mem::take(&mut app.world.resource_mut::<Notices>().0) {
         wake(match notice {

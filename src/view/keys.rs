@@ -149,19 +149,15 @@ impl Viewer {
                 return self.pass_on(tap);
             }
             Tap::Quit => event_loop.exit(),
-            // What is looked at closely is the film alone: the engine is asked for it.
-            Tap::Screenshot | Tap::ScreenshotWithHud
-                if self.is_altered() && (tap == Tap::Screenshot || self.other().is_none()) =>
-            {
-                return self.pass_on(tap);
+            Tap::Screenshot | Tap::ScreenshotWithHud if self.picture.rgba.is_empty() => {
+                self.say("there is no picture yet");
             }
+            // Another picture, or parts of two, cannot be made again from what makes this one.
+            Tap::ScreenshotWithHud if self.other().is_some() => self.save_shown(),
             Tap::FullScreen => {
                 if let Some(screen) = &self.screen {
                     screen.toggle_full_screen();
                 }
-            }
-            Tap::Screenshot | Tap::ScreenshotWithHud => {
-                self.save_screenshot(tap == Tap::ScreenshotWithHud, None);
             }
             tap => return self.pass_on(tap),
         }

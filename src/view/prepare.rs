@@ -21,7 +21,6 @@ use super::pixel_view::{
 };
 use super::plain::{Plain, develop_plain};
 use super::playing::{Clock, advance};
-use super::recipe::recipe;
 use super::sides::{Compared, Sides, change_sides, develop_side};
 use super::status::{Machine, Status};
 use crate::app::{App, FrameBudget, FrameStats, FrameSystems, trace_frame};
@@ -90,9 +89,10 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
     }
     app.add_systems(
         (
+            develop_plain,
             change_region,
             change_settings,
-            (change_sides, change_shown, develop_plain).chain(),
+            (change_sides, change_shown).chain(),
             save_picture,
             change_display,
             (change_pause, advance).chain(),
@@ -135,7 +135,6 @@ pub fn status(app: &App) -> Status {
         legend: world.resource::<CurrentLegend>().0.clone(),
         debug: world.resource::<Debug>().status(),
         edit: world.resource::<Editor>().status(),
-        recipe: recipe(world),
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         kept: shown.kept_share(world.resource::<Film>().complete_samples(), stats.done),

@@ -5,13 +5,14 @@ use super::crop;
 use super::exchange::{Wake, lock};
 use super::input::Command;
 use super::keymap::{Hold, Tap};
+use super::plain::Shot;
 use super::screen::{Presented, Screen};
 use super::screenshot;
 use super::sides::{self, Side};
 use super::status::{Level, Measured, Status};
 use super::ui::Content;
 use super::window::Viewer;
-use crate::image::Picture;
+use crate::image::recipe::Recipe;
 use glam::UVec2;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -68,7 +69,7 @@ impl Viewer {
             return;
         }
         let screen_size = self.screen.as_ref().map_or(UVec2::ONE, Screen::size);
-        let drawn = self.drawn_region();
+        let region = self.outlined(screen_size);
         let other = self.other();
         let Some(screen) = &mut self.screen else {
             return;
@@ -83,11 +84,6 @@ impl Viewer {
             keys: &self.options.keys,
             letters: &self.letters,
         };
-        let region = drawn.map(|corners| corners.map(|at| (at * screen_size.as_dvec2()).as_uvec2()));
-        let region = region.map(|[a, b]| [a.min(b), a.max(b)]).or_else(|| {
-            let [left, top, width, height] = self.status.as_ref().filter(|s| s.size == screen_size)?.region?;
-            Some([UVec2::new(left, top), UVec2::new(left + width, top + height)])
-        });
         let (picture, ui, layer) = (&self.picture, &mut self.ui, &self.layer);
         let outcome = screen.draw(|bytes, size| {
             if picture.rgba.is_empty() {
@@ -102,7 +98,7 @@ impl Viewer {
             if let Some((side, part)) = &other {
                 sides::cover(bytes, size, &side.picture, *part);
             }
-            if let Some(region) = region.filter(|_| ui.level != Level::None) {
+            if let Some(region) = region {
                 crop::outline(bytes, size, region);
             }
             if !ui.is_bare(&content) {
@@ -201,60 +197,61 @@ impl Viewer {
         self.compared.split.then_some((side, self.split))
     }
 
-    /// Whether the picture shows more than the film.
-    pub(super) fn is_altered(&self) -> bool {
-        self.status.as_ref().is_some_and(|status| status.kept > 0.0 || status.smoothed)
+    /// The outline of the part that is refined, or is being drawn, on a screen of `size`.
+    fn outlined(&self, size: UVec2) -> Option<[UVec2; 2]> {
+        if self.ui.level == Level::None {
+            return None;
+        }
+        let drawn = self.drawn_region().map(|corners| corners.map(|at| (at * size.as_dvec2()).as_uvec2()));
+        drawn.map(|[a, b]| [a.min(b), a.max(b)]).or_else(|| {
+            let [left, top, width, height] = self.status.as_ref().filter(|s| s.size == size)?.region?;
+            Some([UVec2::new(left, top), UVec2::new(left + width, top + height)])
+        })
     }
 
-    /// The engine has made the picture of the film alone that `tap` needs.
-    pub(super) fn take_plain(&mut self, tap: Tap, picture: &Picture) {
-        self.save_screenshot(tap == Tap::ScreenshotWithHud, Some(picture));
-    }
-
-    /// Writes what the window shows, or `plain` in place of its picture, to a file, on a thread of its own.
-    pub(super) fn save_screenshot(&mut self, with_hud: bool, plain: Option<&Picture>) {
+    /// The engine has made the picture of the film alone that a screenshot is of.
+    pub(super) fn take_shot(&mut self, shot: &Shot) {
         let Some(screen) = &self.screen else { return };
-        let size = screen.size();
-        let bytes = if let Some(plain) = plain {
-            let mut bytes = vec![0; size.element_product() as usize * 4];
-            screenshot::scale_into(&plain.rgba, plain.size, &mut bytes, size);
-            if with_hud {
-                let scale_factor = screen.window.scale_factor();
-                let status = self.status.as_ref().map(|s| Status { kept: 0.0, smoothed: false, ..s.clone() });
-                let content = Content {
-                    status: status.as_ref(),
-                    measured: self.measured(),
-                    loading: None,
-                    notice: "",
-                    compared: None,
-                    keys: &self.options.keys,
-                    letters: &self.letters,
-                };
-                if let Some(layer) = self.layer.as_ref().filter(|layer| layer.size == size) {
-                    layer.cover(&mut bytes);
-                }
+        let (size, scale_factor) = (screen.size(), screen.window.scale_factor());
+        let mut bytes = vec![0; size.element_product() as usize * 4];
+        screenshot::scale_into(&shot.picture.rgba, shot.picture.size, &mut bytes, size);
+        if shot.tap == Tap::ScreenshotWithHud {
+            if let Some(layer) = self.layer.as_ref().filter(|layer| layer.size == size) {
+                layer.cover(&mut bytes);
+            }
+            if let Some(region) = self.outlined(size) {
+                crop::outline(&mut bytes, size, region);
+            }
+            let status = self.status.as_ref().map(|s| Status { kept: 0.0, smoothed: false, ..s.clone() });
+            let content = Content {
+                status: status.as_ref(),
+                measured: self.measured(),
+                loading: self.loading.as_deref(),
+                notice: &self.notice,
+                compared: None,
+                keys: &self.options.keys,
+                letters: &self.letters,
+            };
+            if !self.ui.is_bare(&content) {
                 self.ui.draw(&mut bytes, size, scale_factor, &content);
             }
-            bytes
-        } else if with_hud {
-            screen.bytes().to_vec()
-        } else if self.picture.rgba.is_empty() {
-            return self.say("there is no picture yet");
-        } else {
-            self.take_published();
-            let mut bytes = vec![0; size.element_product() as usize * 4];
-            screenshot::scale_into(&self.picture.rgba, self.picture.size, &mut bytes, size);
-            bytes
-        };
+        }
+        self.save_screenshot(bytes, size, shot.recipe.clone());
+    }
+
+    /// What the window shows as it is.
+    pub(super) fn save_shown(&mut self) {
+        let Some(screen) = &self.screen else { return };
+        let (bytes, size) = (screen.bytes().to_vec(), screen.size());
+        self.save_screenshot(bytes, size, Recipe::default());
+    }
+
+    /// Writes a file, on a thread of its own.
+    fn save_screenshot(&mut self, bytes: Vec<u8>, size: UVec2, recipe: Recipe) {
         let stem = self.options.screenshot_stem.clone();
-        // Another picture, or parts of two, cannot be made again from what makes this one.
-        let is_other = with_hud && plain.is_none() && self.other().is_some()
-            || self.status.as_ref().is_some_and(|status| status.legend.is_some());
-        let recipe = self.status.as_ref().filter(|_| !is_other).map(|status| status.recipe.clone());
         let proxy = self.proxy.clone();
         let writer = std::thread::spawn(move || {
-            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe.unwrap_or_default())
-            {
+            let said = match screenshot::save(&bytes, size, ".".as_ref(), &stem, &recipe) {
                 Ok(path) => format!("saved {}", path.strip_prefix(".").unwrap_or(&path).display()),
                 Err(why) => format!("no screenshot: {why}"),
             };

@@ -48,6 +48,8 @@ pub fn open_other(app: &App, path: &Path, watcher: Watcher) -> Result<App, Strin
     let budget = app.world.resource::<FrameBudget>().clone();
     other.world.insert_resource(FrameBudget { region: None, ..budget });
     keep_switches(app, &mut other);
+    // Those of the scene that is left are there when it comes back.
+    keep::<Bookmarks>(app, &mut other);
     other.world.insert_resource(Instrument::default().moved());
     Ok(other)
 }

@@ -6,7 +6,6 @@ use super::edit::EditStatus;
 use super::instrument::Graph;
 use super::pixel_view::Legend;
 use crate::image::ToneMap;
-use crate::image::recipe::Recipe;
 use crate::scene::Filter;
 use crate::trace::Integrator;
 use glam::UVec2;
@@ -35,8 +34,6 @@ pub struct Status {
     pub debug: DebugStatus,
     /// What is selected.
     pub edit: Option<Arc<EditStatus>>,
-    /// How to make the picture again.
-    pub recipe: Recipe,
     /// Rays of all kinds per second of tracing.
     pub rays_per_second: f64,
     /// Side of a preview pixel.
@@ -307,7 +304,6 @@ pub(super) mod tests {
             legend: None,
             debug: DebugStatus::default(),
             edit: None,
-            recipe: Recipe::default(),
             rays_per_second: 1.234_5e6,
             preview_scale: Some(4),
             kept: 0.0,

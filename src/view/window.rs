@@ -336,7 +336,7 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.options.screenshot_stem = name;
                 self.redraw();
             }
-            Wake::Plain(tap, picture) => self.take_plain(tap, &picture),
+            Wake::Plain(shot) => self.take_shot(&shot),
             Wake::OpenFailed(why) => self.fail(event_loop, ViewError::Scene(why)),
             Wake::Crashed(why) => self.fail(event_loop, ViewError::Lost(format!("internal error: {why}"))),
         }

@@ -89,6 +89,7 @@ pub fn render_to(scene: &SceneArgs, output: &OutputArgs, outputs: Vec<PathBuf>) 
         }
         Err(RenderError::Open(OpenError::Load(error))) => exit::because(&error, exit::SCENE_NOT_READABLE),
         Err(RenderError::Open(error)) => exit::because(&error, exit::BAD_COMMAND_LINE),
+        Err(error @ RenderError::OfAPart) => exit::because(&error, exit::BAD_COMMAND_LINE),
         Err(error) => exit::because(&error, exit::FAILED),
     }
 }

@@ -3,6 +3,7 @@
 use super::{Check, Settings};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
+use crate::load::{LoadOptions, LoadReport, pose};
 use crate::scene::path::find;
 use crate::scene::{Glossy, Hidden, Instance, Light, Material, Transform};
 use bevy_ecs::name::Name;
@@ -235,19 +236,53 @@ pub fn rows_of(transform: &Transform) -> [[f64; 4]; 4] {
     DMat4::from(transform.0).transpose().to_cols_array_2d()
 }
 
-/// Changes what the tables say. One that speaks of something that is not there is a warning.
-pub(super) fn apply_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<(), LoadError> {
-    for table in &settings.tables.edit {
-        apply(settings, table, sink)?;
+/// What was edited in a scene. It comes after all that the program decides by the scene's extent and lights, since who
+/// edits it has that before his eyes; and after the animations, so that what is moved by hand stands where it was put.
+#[derive(Default)]
+pub(crate) struct Edits(pub(in crate::load) Vec<Settings>);
+
+impl Edits {
+    fn tables(&self) -> impl Iterator<Item = (&Settings, &Spanned<EditTable>)> {
+        self.0.iter().flat_map(|settings| settings.tables.edit.iter().map(move |table| (settings, table)))
     }
-    Ok(())
+
+    /// Whether nothing was edited.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.tables().next().is_none()
+    }
+
+    /// See [`EditTable::origin`].
+    pub(in crate::load) fn origin(&self) -> Option<[f64; 3]> {
+        self.tables().filter_map(|(_, table)| table.get_ref().origin).last()
+    }
+
+    /// Changes the scene that was loaded with `options`, and adds to its report.
+    ///
+    /// # Errors
+    /// What about an edit is wrong; then some of them may have been made.
+    pub(crate) fn apply(
+        &self,
+        world: &mut World,
+        options: &LoadOptions,
+        report: &mut LoadReport,
+    ) -> Result<(), LoadError> {
+        let mut sink = Sink::new(world, options);
+        std::mem::swap(&mut sink.report, report);
+        let made = self.make(&mut sink);
+        std::mem::swap(&mut sink.report, report);
+        made
+    }
+
+    /// Changes what the tables say. One that speaks of something that is not there is a warning.
+    pub(in crate::load) fn make(&self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
+        self.tables().try_for_each(|(settings, table)| apply(settings, table, sink))?;
+        pose(sink.world);
+        Ok(())
+    }
 }
 
 fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -> Result<(), LoadError> {
     let edit = table.get_ref();
-    if let Some(origin) = edit.origin {
-        sink.report.render.origin = Some(origin);
-    }
     let path = edit.entity.join("/");
     match change(sink.world, edit) {
         Ok(Changed::Nothing) if path.is_empty() => {}

@@ -79,6 +79,7 @@ mod light;
 mod material;
 mod model;
 
+pub(crate) use edit::Edits;
 pub(super) use material::Materials;
 pub(super) use model::Model;
 
@@ -212,11 +213,6 @@ impl Settings {
     /// Spawns the lights.
     pub(super) fn spawn_lights(&self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
         self.tables.light.iter().enumerate().try_for_each(|(i, table)| light::spawn(self, i, table, sink))
-    }
-
-    /// Changes what the `[[edit]]` tables say.
-    pub(super) fn apply_edits(&self, sink: &mut Sink<'_>) -> Result<(), LoadError> {
-        edit::apply_all(self, sink)
     }
 
     fn check_render(&self, table: &Spanned<SidecarRender>) -> Result<(), LoadError> {

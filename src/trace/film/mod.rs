@@ -15,7 +15,6 @@ pub use tile::Tile;
 use super::sightlines::Sightlines;
 use bevy_ecs::prelude::*;
 use glam::UVec2;
-use pixel::EMPTY;
 use shares::Stage;
 
 /// Side of a tile in pixels.
@@ -42,7 +41,6 @@ impl Film {
             .flat_map(|y| (0..across.x).map(move |x| UVec2::new(x, y) * TILE))
             .map(|origin| {
                 let size = (size - origin).min(UVec2::splat(TILE));
-                let pixels = vec![Pixel::default(); size.element_product() as usize];
                 Tile {
                     origin,
                     size,
@@ -54,9 +52,11 @@ impl Film {
                     early: Vec::new(),
                     dropped: 0,
                     rests: false,
-                    stale: false,
+                    // Memory for all of a large picture takes a second from the system: each tile asks for its own when it is
+                    // first worked on, in all threads and with pauses between.
+                    stale: true,
                     sightlines: Sightlines::default(),
-                    pixels,
+                    pixels: Vec::new(),
                 }
             })
             .collect();
@@ -156,7 +156,7 @@ impl Film {
     pub fn pixel(&self, x: u32, y: u32) -> &Pixel {
         let across = self.size.x.div_ceil(TILE);
         let tile = &self.tiles[(y / TILE * across + x / TILE) as usize];
-        if tile.stale { &EMPTY } else { &tile.pixels[(y % TILE * tile.size.x + x % TILE) as usize] }
+        &tile.held()[(y % TILE * tile.size.x + x % TILE) as usize]
     }
 
     /// The pixels of row `y`, from the left.
@@ -165,8 +165,7 @@ impl Film {
         let tiles = &self.tiles[(y / TILE) as usize * across..][..across];
         tiles.iter().flat_map(move |tile| {
             let first = (y % TILE * tile.size.x) as usize;
-            let row = &tile.pixels[first..first + tile.size.x as usize];
-            row.iter().map(|pixel| if tile.stale { &EMPTY } else { pixel })
+            &tile.held()[first..first + tile.size.x as usize]
         })
     }
 
@@ -196,10 +195,10 @@ impl Film {
     pub fn looked_at(&self) -> f64 {
         // Also those of which every sample was dropped.
         let seen = |tile: &Tile| match tile.next_sample > self.first_sample {
-            true => tile.pixels.len(),
+            true => tile.held().len(),
             false => tile.pixels().filter(|pixel| pixel.count() > 0).count(),
         };
-        let pixels: usize = self.working().map(|tile| tile.pixels.len()).sum();
+        let pixels: usize = self.working().map(|tile| tile.held().len()).sum();
         self.working().map(seen).sum::<usize>() as f64 / pixels as f64
     }
 

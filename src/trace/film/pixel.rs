@@ -1,5 +1,6 @@
 //! Exact sums of the samples of one pixel.
 
+use super::TILE;
 use glam::{DVec3, Vec3};
 
 /// A sum of f32 samples as a multiple of 2⁻⁶⁰.
@@ -150,7 +151,8 @@ impl Pixel {
 }
 
 /// One without samples.
-pub(super) static EMPTY: Pixel = Pixel { sums: [[Sum(0); 3]; 2], counts: [0; 2] };
+pub(super) static EMPTY: [Pixel; (TILE * TILE) as usize] =
+    [Pixel { sums: [[Sum(0); 3]; 2], counts: [0; 2] }; (TILE * TILE) as usize];
 
 #[cfg(test)]
 mod tests {

@@ -29,7 +29,7 @@ pub struct Tile {
     pub dropped: u64,
     /// It gets no samples for now.
     pub(super) rests: bool,
-    /// What the pixels hold is from before the last reset.
+    /// What the pixels hold is from before the last reset; or there are none yet.
     pub(super) stale: bool,
     /// What is known of its part of the scene until the next reset.
     pub(in crate::trace) sightlines: Sightlines,
@@ -123,13 +123,19 @@ impl Tile {
 
     /// Rows from the top, to look at.
     pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
-        self.pixels.iter().map(|pixel| if self.stale { &EMPTY } else { pixel })
+        self.held().iter()
+    }
+
+    /// The same: where nobody has worked yet there is no memory that they would be in.
+    pub(super) fn held(&self) -> &[Pixel] {
+        if self.stale { &EMPTY[..self.size.element_product() as usize] } else { &self.pixels }
     }
 
     /// Rows from the top.
     pub fn pixels_mut(&mut self) -> &mut [Pixel] {
         if std::mem::take(&mut self.stale) {
-            self.pixels.fill(Pixel::default());
+            self.pixels.clear();
+            self.pixels.resize(self.size.element_product() as usize, Pixel::default());
         }
         &mut self.pixels
     }

@@ -160,6 +160,8 @@ fn say(world: &mut World, text: &str) {
 fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
     let found = pick(world, cursor, editor.selected.is_some());
     editor.row = 0;
+    // That was told of another.
+    editor.redone.clear();
     editor.selected = if editor.selected == found { None } else { found };
     if found.is_none() {
         say(world, "nothing there to edit: {next_thing} goes through all there is");
@@ -168,6 +170,7 @@ fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
 
 fn go(world: &mut World, editor: &mut Editor, by: i64) {
     editor.row = 0;
+    editor.redone.clear();
     editor.selected = stepped(&things(world), editor.selected, by);
     if editor.selected.is_none() {
         say(world, "there is nothing to edit");
@@ -220,8 +223,9 @@ fn copy(world: &mut World, editor: &mut Editor) {
     editor.undo.push(Undo::of_copy(copied, selection));
     editor.selected = Some(copied);
     // Beside the original, not in it.
-    let aside = rows(world, copy, 0, radius(world)).first().map(|row| row.stepped(5.0));
-    if let Some(x) = aside {
+    let rows = rows(world, copy, 0, radius(world));
+    let aside = rows.iter().find(|row| row.property == Property::Position(0));
+    if let Some(x) = aside.map(|row| row.stepped(5.0)) {
         set(world, copy, copied.slot, Property::Position(0), x);
     }
     editor.note(copied);

@@ -5,6 +5,7 @@ use crate::scene::color::luminance;
 use crate::scene::{GlobalTransform, Glossy, Instance, Light, Material, Transform};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot, Vec3};
+use std::f64::consts::PI;
 
 /// One number of a thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,10 @@ pub enum Property {
     Position(usize),
     /// About a world axis (the one after the other: x, y, z), degrees.
     Turn(usize),
+    /// Where a sun stands on the compass, degrees: 0 beyond -Z, 90 on the side of +X.
+    Azimuth,
+    /// How high it stands above the horizon, degrees.
+    Elevation,
     /// Factor in all directions.
     Scale,
     /// A channel of the light's spectra, relative to the strongest.
@@ -91,7 +96,13 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         rows.push(Row { property, label, value: value + 0.0, step, grows, range });
     };
     let light = world.get::<Light>(entity);
-    let has_place = !matches!(light, Some(Light::Environment { .. } | Light::Sky { .. }));
+    let has_place =
+        !matches!(light, Some(Light::Environment { .. } | Light::Sky { .. } | Light::Directional { .. }));
+    if let (Some(Light::Directional { .. }), Some(place)) = (light, world.get::<GlobalTransform>(entity)) {
+        let [azimuth, elevation] = stands(&place.0);
+        add(Property::Azimuth, "azimuth", azimuth, 5.0, false, ANY);
+        add(Property::Elevation, "elevation", elevation, 5.0, false, [-90.0, 90.0]);
+    }
     if let Some(place) = world.get::<GlobalTransform>(entity).filter(|_| has_place) {
         let (scale, rotation, translation) = parts(&place.0);
         for axis in 0..3 {
@@ -173,10 +184,32 @@ fn parts(place: &DAffine3) -> (DVec3, DVec3, DVec3) {
     (scale, DVec3::new(x, y, z), translation)
 }
 
+/// Azimuth and elevation of a sun, degrees. It shines along its -Z.
+fn stands(place: &DAffine3) -> [f64; 2] {
+    let towards = place.matrix3.z_axis.normalize_or(DVec3::Y);
+    // At the zenith what is across still knows where it came from.
+    let across = place.matrix3.x_axis;
+    let (east, north) = match towards.x.hypot(towards.z) > 1e-6 {
+        true => (towards.x, -towards.z),
+        false => (-across.z, -across.x),
+    };
+    let azimuth = east.atan2(north).to_degrees();
+    [if azimuth < 0.0 { azimuth + 360.0 } else { azimuth }, towards.y.clamp(-1.0, 1.0).asin().to_degrees()]
+}
+
+/// The rotation of a sun that stands there.
+fn turned([azimuth, elevation]: [f64; 2]) -> DMat3 {
+    DMat3::from_rotation_y(PI - azimuth.to_radians()) * DMat3::from_rotation_x(-elevation.to_radians())
+}
+
 /// Gives `property` of `entity` the value. What the thing does not have stays.
 pub fn set(world: &mut World, entity: Entity, slot: usize, property: Property, value: f64) {
     match property {
-        Property::Position(_) | Property::Turn(_) | Property::Scale => place(world, entity, property, value),
+        Property::Position(_)
+        | Property::Turn(_)
+        | Property::Azimuth
+        | Property::Elevation
+        | Property::Scale => place(world, entity, property, value),
         Property::LightColor(_) | Property::Power | Property::Size(_) => {
             if let Some(mut light) = world.get_mut::<Light>(entity) {
                 set_light(&mut light, property, value as f32);
@@ -209,6 +242,8 @@ fn place(world: &mut World, entity: Entity, property: Property, value: f64) {
             to[axis] = value.to_radians();
             moved.matrix3 = rotation(to) * rotation(turn).inverse() * global.matrix3;
         }
+        Property::Azimuth => moved.matrix3 = turned([value, stands(&global)[1]]),
+        Property::Elevation => moved.matrix3 = turned([stands(&global)[0], value]),
         _ => moved.matrix3 *= value / scale.abs().max_element(),
     }
     let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);

@@ -13,7 +13,7 @@ use bevy_ecs::prelude::*;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Serialize)]
 struct Tables {
@@ -61,29 +61,44 @@ pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
     tables
 }
 
-/// The whole settings file: what the scene's own says, and the edits.
+/// The whole settings file: what the scene's own says, and the edits; and the folder that it belongs to, where people look for
+/// it, which may be another than this only if no file is named from there.
 ///
 /// # Errors
 /// What cannot be read or written down.
-pub fn text(world: &World, editor: &Editor) -> Result<(String, PathBuf), String> {
+pub fn text(world: &World, editor: &Editor) -> Result<(String, Place), String> {
     let origin = world.get_resource::<SceneOrigin>().ok_or("the scene is of no file")?;
     let mut own = origin.options.scene_settings.clone();
-    let mut folder = PathBuf::from(".");
-    if let (None, SceneSource::File(scene)) = (&own, &origin.source) {
+    let mut place = Place { folder: PathBuf::from("."), is_free: true };
+    if let SceneSource::File(scene) = &origin.source {
+        place.folder = folder_of(scene);
         let beside = scene.with_extension("toml");
-        own = (beside.is_file() && beside != *scene).then_some(beside);
+        own = own.or_else(|| (beside.is_file() && beside != *scene).then_some(beside));
     }
     let mut text = String::new();
     if let Some(own) = own {
         text = std::fs::read_to_string(&own).map_err(|error| format!("{}: {error}", own.display()))?;
         text += "\n";
         // Its textures are named from where it is.
-        folder = own.parent().map_or(folder, PathBuf::from);
+        place = Place { folder: folder_of(&own), is_free: false };
     }
     // Those that the program was started with have not been saved either.
     let before = origin.options.edits.as_deref().unwrap_or_default();
     text = format!("{text}{before}\n{}", edits(world, editor)?);
-    Ok((text, folder))
+    Ok((text, place))
+}
+
+/// Where a file of edits goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Beside the scene, or beside its own settings file.
+    pub folder: PathBuf,
+    /// Whether another would do as well: nothing in it is named from there.
+    pub is_free: bool,
+}
+
+fn folder_of(file: &Path) -> PathBuf {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_path_buf()
 }
 
 /// The edits alone; empty if there are none.
@@ -97,41 +112,62 @@ pub fn edits(world: &World, editor: &Editor) -> Result<String, String> {
     toml::to_string(&Tables { edit: tables(world, editor) }).map_err(|error| error.to_string())
 }
 
-/// Writes the first of `{scene}.edits_1.toml`, `_2` … that is not there, and gives the command that renders it as it is seen.
+/// Writes the first of `{scene}.edits_1.toml`, `_2` … that is not there beside the scene, or where the program was started if
+/// nobody may write there; and gives the command that renders it as it is seen.
 #[must_use]
 pub fn save(world: &World, editor: &Editor) -> Notice {
     match write(world, editor) {
-        Ok((path, command)) => Notice::Saved(format!("saved {path}"), command),
+        Ok((said, command)) => Notice::Saved(format!("saved {said}"), command),
         Err(why) => Notice::Text(format!("not saved: {why}")),
     }
 }
 
-/// Where it was written, and the command.
+/// What was written where, and the command.
 fn write(world: &World, editor: &Editor) -> Result<(String, String), String> {
     let origin = world.get_resource::<SceneOrigin>().ok_or("the scene is of no file")?;
     if !editor.has_edits() && origin.options.edits.is_none() {
         return Err("nothing was edited".to_owned());
     }
-    let (text, folder) = text(world, editor)?;
+    let (text, place) = text(world, editor)?;
     let stem = origin.source.name();
+    let here = Path::new(".");
+    let (path, why) = match numbered(&place.folder, &stem, &text) {
+        Ok(path) => (path, String::new()),
+        Err(why) if place.is_free && place.folder != here => {
+            let elsewhere = numbered(here, &stem, &text).map_err(|_| why.clone())?;
+            (elsewhere, format!(" where the program was started ({why})"))
+        }
+        Err(why) => return Err(why),
+    };
+    let path = path.strip_prefix(".").unwrap_or(&path);
+    // A path may be longer than the window is wide.
+    let is_beside =
+        |scene: &PathBuf| place.folder != here && path.parent() == Some(folder_of(scene).as_path());
+    let said = match &origin.source {
+        SceneSource::File(scene) if is_beside(scene) => {
+            format!("{} beside the scene", path.file_name().unwrap_or_default().display())
+        }
+        _ => format!("{}{why}", path.display()),
+    };
+    let mut command = ["penumbra", "render"].map(str::to_owned).to_vec();
+    let scene = match &origin.source {
+        SceneSource::File(scene) => absolute(scene),
+        other => other.to_string(),
+    };
+    command.extend([scene, "--scene-settings".to_owned(), absolute(path)]);
+    command.extend(look_flags(world));
+    Ok((said, shell_line(&command)))
+}
+
+/// Writes `text` to the first file of that name whose number is free.
+fn numbered(folder: &Path, stem: &str, text: &str) -> Result<PathBuf, String> {
     for n in 1..u32::MAX {
         let path = folder.join(format!("{stem}.edits_{n}.toml"));
+        let told = |error: std::io::Error| format!("{}: {error}", path.display());
         match File::create_new(&path) {
-            Ok(mut file) => {
-                file.write_all(text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
-                let path = path.strip_prefix(".").unwrap_or(&path).display().to_string();
-                let mut command = ["penumbra", "render"].map(str::to_owned).to_vec();
-                let scene = match &origin.source {
-                    SceneSource::File(scene) => absolute(scene),
-                    other => other.to_string(),
-                };
-                let settings = absolute(path.as_ref());
-                command.extend([scene, "--scene-settings".to_owned(), settings]);
-                command.extend(look_flags(world));
-                return Ok((path, shell_line(&command)));
-            }
+            Ok(mut file) => return file.write_all(text.as_bytes()).map(|()| path.clone()).map_err(told),
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(format!("{}: {error}", path.display())),
+            Err(error) => return Err(told(error)),
         }
     }
     Err("no number is left".to_owned())

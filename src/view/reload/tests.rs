@@ -2,7 +2,7 @@
 
 use super::super::controls::{Notice, Notices};
 use super::super::input::Press;
-use super::super::keymap::Tap;
+use super::super::keymap::{Side, Tap};
 use super::super::prepare::prepare;
 use super::super::recipe::recipe;
 use super::*;
@@ -10,7 +10,7 @@ use crate::bvh::Isa;
 use crate::cli::{Cli, Command};
 use crate::farm::Identity;
 use crate::image::ToneMap;
-use crate::open::Pose;
+use crate::open::{LoadCard, Pose};
 use crate::scene::Filter;
 use crate::trace::Integrator;
 use bevy_ecs::name::Name;
@@ -94,7 +94,7 @@ fn last_notice(app: &App) -> Notice {
 /// The floor is selected, moved and copied.
 const EDIT: [Tap; 4] = [Tap::Select, Tap::More, Tap::Duplicate, Tap::More];
 
-/// Removes the file of edits that a printed command names: it is where the program was started.
+/// Removes the file of edits that a printed command names.
 fn discard_saved(line: &str) {
     let mut words = line.split_whitespace().skip_while(|word| *word != "--scene-settings");
     std::fs::remove_file(words.nth(1).unwrap()).unwrap();
@@ -241,4 +241,55 @@ fn the_printed_command_makes_what_is_seen_with_a_dropped_sky_and_all_settings() 
     assert_eq!(identity(&rendered).differences(&identity(&app)), Vec::<String>::new(), "{line}");
     let shown = |app: &App| *app.world.resource::<Display>();
     assert_eq!(shown(&rendered), shown(&app));
+}
+
+#[test]
+fn each_scene_has_its_bookmarks_whatever_is_opened_between() {
+    let stage = Stage::new("bookmarks");
+    stage.write("other.toml", &Stage::scene("floor.obj", 4));
+    let mut app = stage.scene_shown();
+    press(&mut app, &[Tap::FrameAll, Tap::Remember(1)]);
+    let place = identity(&app).camera;
+    let shown =
+        |app: &App, name: &str| ready(open_other(app, &stage.0.join(name), Watcher::default()).unwrap());
+    let mut other = shown(&app, "other.toml");
+    press(&mut other, &[Tap::Recall(1)]);
+    assert!(matches!(last_notice(&other), Notice::Text(text) if text.contains("is empty")));
+    press(&mut other, &[Tap::View(Side::Top), Tap::Remember(1)]);
+    let above = identity(&other).camera;
+    let mut app = shown(&other, "scene.toml");
+    assert_ne!(identity(&app).camera, place);
+    press(&mut app, &[Tap::Recall(1)]);
+    assert_eq!(identity(&app).camera, place);
+    let mut other = shown(&app, "other.toml");
+    press(&mut other, &[Tap::Recall(1)]);
+    assert_eq!(identity(&other).camera, above);
+}
+
+#[test]
+fn edits_are_saved_beside_the_scene_and_told_of_when_it_is_opened_again() {
+    let stage = Stage::new("beside");
+    stage.write("lone.obj", "v -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nf 1 4 3 2\n");
+    let mut app = stage.open("lone.obj", Wishes::default(), &LoadOptions::default());
+    let card = |app: &App| app.world.resource::<LoadCard>().text.to_string();
+    assert!(!card(&app).contains("edits_"));
+    press(&mut app, &EDIT);
+    press(&mut app, &[Tap::SaveEdits, Tap::More, Tap::SaveEdits]);
+    let saved = [1, 2].map(|n| stage.0.join(format!("lone.edits_{n}.toml")));
+    assert!(saved.iter().all(|path| path.is_file()));
+    let Notice::Saved(said, line) = last_notice(&app) else { panic!("{:?}", last_notice(&app)) };
+    assert_eq!(said, "saved lone.edits_2.toml beside the scene");
+    assert!(line.contains(&saved[1].display().to_string()), "{line}");
+    // Nothing is applied that nobody asked for, but it is said how.
+    let again = stage.open("lone.obj", Wishes::default(), &LoadOptions::default());
+    assert_ne!(identity(&again), identity(&app));
+    assert!(
+        card(&again).contains("not applied") && card(&again).contains("lone.edits_2.toml"),
+        "{}",
+        card(&again)
+    );
+    let settings = LoadOptions { scene_settings: Some(saved[1].clone()), ..LoadOptions::default() };
+    let with = stage.open("lone.obj", Wishes::default(), &settings);
+    assert_eq!(identity(&with).scene_hash, identity(&app).scene_hash);
+    assert!(!card(&with).contains("not applied"));
 }

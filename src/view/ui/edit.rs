@@ -2,6 +2,7 @@
 
 use super::super::edit::EditStatus;
 use super::super::edit::property::{Property, Row};
+use super::glyphs::legible;
 use super::place::Places;
 use super::style::{self, ACCENT, CAUTION, FAINT, MARGIN};
 use egui::scroll_area::ScrollSource;
@@ -45,11 +46,11 @@ pub fn show(
             ui.set_width((WIDTH - frame.x).min(places.room.width()));
             // Not as high as it was last: that may have been of something with fewer numbers.
             ui.set_max_height(height - frame.y);
-            ui.label(RichText::new(&status.name).color(ACCENT));
+            ui.label(RichText::new(legible(context, &status.name)).color(ACCENT));
             let [here, all] = status.place;
             ui.horizontal_wrapped(|ui| {
                 if let Some(kind) = &status.kind {
-                    ui.label(RichText::new(kind).small());
+                    ui.label(RichText::new(legible(context, kind)).small());
                 }
                 ui.label(RichText::new(format!("{here} of {all}")).color(FAINT).small());
                 if status.hidden {

@@ -3,6 +3,7 @@
 pub mod debug;
 pub mod edit;
 mod events;
+mod glyphs;
 pub mod graph;
 pub mod help;
 pub mod legend;
@@ -20,6 +21,7 @@ use super::keymap::Keymap;
 use super::status::{Level, Measured, Status, altered};
 use egui::{Align2, Area, Context, Event, Id, Pos2, RawInput, Rect, RichText, ViewportId, vec2};
 use glam::UVec2;
+use glyphs::{Glyphs, legible};
 use paint::Painter;
 use place::{Place, Places};
 use std::time::Instant;
@@ -57,6 +59,7 @@ pub struct Ui {
     pub graph: bool,
     context: Context,
     painter: Painter,
+    glyphs: Glyphs,
     events: Vec<Event>,
     /// What the user has changed on a card.
     pub edits: Vec<(Property, f64)>,
@@ -76,6 +79,7 @@ impl Default for Ui {
             graph: false,
             context,
             painter,
+            glyphs: Glyphs::default(),
             events: Vec::new(),
             edits: Vec::new(),
             start: Instant::now(),
@@ -112,7 +116,8 @@ impl Ui {
         // has to make room for one that has become larger.
         for _ in 0..3 {
             let now = rects(&context);
-            if now == before && !context.has_requested_repaint() {
+            let has_letters = self.glyphs.fetch(&context);
+            if now == before && !has_letters && !context.has_requested_repaint() {
                 break;
             }
             before = now;
@@ -156,7 +161,7 @@ impl Ui {
         }
         if let Some(text) = content.loading {
             card(context, "loading", (Align2::CENTER_CENTER, vec2(0.0, 0.0)), |ui| {
-                ui.label(RichText::new(text).size(16.0));
+                ui.label(RichText::new(legible(context, text)).size(16.0));
             });
         }
         self.help.show(context, content.keys, content.letters);
@@ -172,7 +177,7 @@ impl Ui {
             let area = Area::new(Id::new("notice")).interactable(false).order(egui::Order::Foreground);
             show_card(context, area, place, |ui| {
                 ui.set_max_width(places.room.width() - 6.0 * MARGIN);
-                ui.label(content.notice);
+                ui.label(legible(context, content.notice));
             });
         }
     }

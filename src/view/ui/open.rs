@@ -1,6 +1,7 @@
 //! A line to type the name of a file into, which completes it.
 
 use super::card;
+use super::glyphs::legible;
 use super::style::{ACCENT, BRIGHT, CAUTION, FAINT};
 use crate::load::built_in_scenes;
 use egui::{Align2, Context, FontId, RichText, vec2};
@@ -201,12 +202,12 @@ pub fn show(context: &Context, prompt: &Prompt) {
         );
         let (before, after) = prompt.text.split_at(prompt.cursor);
         let line = if after.is_empty() { format!("{before}_") } else { format!("{before}|{after}") };
-        ui.label(RichText::new(line).font(FontId::monospace(14.0)).color(ACCENT));
+        ui.label(RichText::new(legible(context, &line)).font(FontId::monospace(14.0)).color(ACCENT));
         if !prompt.said.is_empty() {
-            ui.label(RichText::new(&prompt.said).color(CAUTION));
+            ui.label(RichText::new(legible(context, &prompt.said)).color(CAUTION));
         }
         for name in prompt.names.iter().take(MOST_NAMES) {
-            ui.label(RichText::new(name).font(FontId::monospace(11.0)).color(BRIGHT));
+            ui.label(RichText::new(legible(context, name)).font(FontId::monospace(11.0)).color(BRIGHT));
         }
         if prompt.names.len() > MOST_NAMES {
             let more = format!("and {} more", prompt.names.len() - MOST_NAMES);

@@ -1,6 +1,7 @@
 //! What loading has found: the card that `check` prints, in two columns.
 
 use super::card;
+use super::glyphs::legible;
 use super::style::{ACCENT, BRIGHT, CAUTION, FAINT};
 use egui::{Align2, Context, FontId, Grid, RichText, Vec2, vec2};
 
@@ -14,7 +15,8 @@ const LETTER: f32 = 0.6;
 /// Shows the card in the middle.
 pub fn show(context: &Context, text: &str) {
     let room = context.content_rect().size() * vec2(0.86, 0.9);
-    let (title, rows) = rows(text);
+    let text = legible(context, text);
+    let (title, rows) = rows(&text);
     let shown = rows.len().min(MOST_LINES);
     let size = fitting(&rows[..shown], room);
     let font = FontId::monospace(size);

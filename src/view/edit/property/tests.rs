@@ -73,3 +73,32 @@ fn values_stay_where_they_mean_something() {
         }
     }
 }
+
+#[test]
+fn a_sun_stands_where_a_compass_and_a_protractor_say() {
+    let mut world = World::new();
+    let parent = world.spawn(Transform::from_parts(DVec3::ONE, DQuat::from_rotation_x(0.7), DVec3::ONE)).id();
+    let light = Light::Directional { irradiance: Vec3::ONE, angle: 0.01 };
+    let sun = world.spawn((light, Transform::default(), ChildOf(parent))).id();
+    crate::app::propagate(&mut world);
+    let labels: Vec<&str> = rows(&world, sun, 0, 1.0).iter().map(|row| row.label).collect();
+    assert_eq!(labels[..3], ["azimuth", "elevation", "strength"]);
+    let shines = |world: &World| -world.get::<GlobalTransform>(sun).unwrap().0.matrix3.z_axis;
+    let half = 0.5_f64.sqrt();
+    for (azimuth, elevation, along) in [
+        (0.0, 0.0, DVec3::Z),
+        (90.0, 0.0, DVec3::NEG_X),
+        (180.0, 45.0, DVec3::new(0.0, -half, -half)),
+        (270.0, -90.0, DVec3::Y),
+        (270.0, 90.0, DVec3::NEG_Y),
+        (270.0, 0.0, DVec3::X),
+    ] {
+        set(&mut world, sun, 0, Property::Azimuth, azimuth);
+        set(&mut world, sun, 0, Property::Elevation, elevation);
+        assert!((shines(&world) - along).length() < 1e-9, "{azimuth} {elevation}: {}", shines(&world));
+    }
+    // From the zenith it comes down on the side that it went up.
+    set(&mut world, sun, 0, Property::Elevation, 90.0);
+    set(&mut world, sun, 0, Property::Elevation, 10.0);
+    assert!((stands(&world.get::<GlobalTransform>(sun).unwrap().0)[0] - 270.0).abs() < 1e-6);
+}
