@@ -59,7 +59,9 @@ pub(super) fn exposure(text: &str) -> Result<f32, String> {
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 =
         text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    Duration::try_from_secs_f64(number).map_err(|e| e.to_string())
+    // In less there is time for nothing.
+    let seconds = Duration::try_from_secs_f64(number).ok().filter(|&time| time >= Duration::from_millis(1));
+    seconds.ok_or_else(|| format!("\"{text}\" is not a time of 0.001 or more, such as 2.5 or 2.5s"))
 }
 
 pub(super) fn noise(text: &str) -> Result<f64, String> {
@@ -112,6 +114,9 @@ mod tests {
         assert_eq!(vector("-1, 2.5,3e1"), Ok(DVec3::new(-1.0, 2.5, 30.0)));
         assert_eq!(sample_range("16..64"), Ok(16..64));
         assert_eq!(seconds("1.5s"), Ok(Duration::from_millis(1500)));
+        for wrong in ["0", "-1", "0s", "-0.0", "nan", "inf", "1e-9", "1e30", "", "s", "soon"] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
         for wrong in ["0x5", "5", "ax3", "65536x65536"] {
             assert!(resolution(wrong).is_err(), "{wrong}");
         }
