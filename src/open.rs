@@ -134,6 +134,8 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
         shafts: default.shafts,
         light_samples: default.light_samples,
         reuse: default.reuse,
+        cuts: default.cuts,
+        shares_again: default.shares_again,
     };
     let samples = wishes.samples.or(file.spp);
     let exposure = wishes.exposure.or(file.exposure);

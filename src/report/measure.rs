@@ -7,7 +7,7 @@ use crate::app::App;
 use crate::image::compare::{Difference, LinearImage};
 use crate::sync;
 use crate::trace::noise::relative_noise;
-use crate::trace::{Film, RayCounts, RenderSettings, TraceScene, trace_adaptive, trace_pass};
+use crate::trace::{Film, LightSampling, RayCounts, RenderSettings, TraceScene, trace_adaptive, trace_pass};
 use glam::Vec3;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -206,8 +206,10 @@ pub fn run(
 ) -> (Run, Option<LinearImage>) {
     let mut settings = RenderSettings { seed, ..subject.settings };
     (method.apply)(&mut settings);
-    let mut tracing =
-        Tracing::new(traceable(subject.app, &settings), subject.interrupt).adaptive(method.adaptive);
+    let scene = traceable(subject.app, &settings);
+    let lights = (method.lights != LightSampling::BEST).then(|| scene.lights.sampled(method.lights));
+    let scene = TraceScene { lights: lights.as_ref().unwrap_or(scene.lights), ..scene };
+    let mut tracing = Tracing::new(scene, subject.interrupt).adaptive(method.adaptive);
     let mut run = Run { seed, ..Run::default() };
     let mut kept = None;
     'run: for checkpoint in checkpoints() {

@@ -2,6 +2,7 @@
 
 use super::emitter::{Emitter, Receiver};
 use super::light::{LightSample, sample_at, sample_flat};
+use super::light_sampling::LightSampling;
 use super::light_tree::LightTree;
 use super::spherical::{SphericalTriangle, meet, weights};
 use crate::bvh::Aabb;
@@ -25,6 +26,8 @@ pub struct MeshLight {
     pub(crate) two_sided: bool,
     /// The placement mirrors: the front is where `corners` run clockwise.
     pub(crate) mirrored: bool,
+    /// How places on it are chosen.
+    sampling: LightSampling,
     /// All of them together, as if they shone with luminance 1.
     shape: Emitter,
     luminance: f32,
@@ -93,6 +96,20 @@ impl MeshLight {
         Some(light)
     }
 
+    /// Whether its triangles are chosen by what they may bring.
+    #[must_use]
+    pub fn has_tree(&self) -> bool {
+        !self.tree.is_empty()
+    }
+
+    /// Chooses triangles and places otherwise.
+    pub(super) fn sample_so(&mut self, sampling: LightSampling) {
+        self.sampling = sampling;
+        if !sampling.tree {
+            self.tree = Arc::default();
+        }
+    }
+
     /// What a choice among many lights needs to know.
     pub(super) fn emitter(&self) -> Emitter {
         Emitter { intensity: self.shape.intensity * self.luminance, ..self.shape }
@@ -151,7 +168,7 @@ impl MeshLight {
         let at = |[b1, b2]: [f32; 2]| a * (1.0 - b1 - b2) + b * b1 + c * b2;
         let cross = (b - a).cross(c - a);
         let normal = cross.try_normalize()? * if self.mirrored { -1.0 } else { 1.0 };
-        let (sample, [b1, b2]) = if is_near(corners, point) {
+        let (sample, [b1, b2]) = if self.is_near(corners, point) {
             let seen = seen_from(corners, point)?;
             let corners = corners.map(Vec3::as_dvec3);
             let position = meet(&corners, point, seen.sample(f64::from(rest), f64::from(u.y)))?;
@@ -171,12 +188,16 @@ impl MeshLight {
         })
     }
 
+    fn is_near(&self, corners: &[Vec3; 3], point: Vec3) -> bool {
+        self.sampling.solid_angle && is_near(corners, point)
+    }
+
     /// Density in solid angle of sampling `triangle` for a point at this distance and cosine at the light.
     #[must_use]
     pub fn pdf(&self, triangle: u32, to: &Receiver, distance2: f32, cos: f32) -> f32 {
         let Ok(i) = self.triangles.binary_search(&triangle) else { return 0.0 };
         let share = self.chance(to, i);
-        if is_near(&self.corners[i], to.point) {
+        if self.is_near(&self.corners[i], to.point) {
             return seen_from(&self.corners[i], to.point)
                 .map_or(0.0, |seen| (f64::from(share) / seen.solid_angle) as f32);
         }

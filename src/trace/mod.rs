@@ -19,6 +19,7 @@ pub mod first;
 pub mod guess;
 pub mod integrator;
 pub mod light;
+pub mod light_sampling;
 pub mod light_tree;
 pub mod lights;
 pub mod mesh_light;
@@ -44,6 +45,7 @@ pub mod warp;
 
 pub use camera::Viewpoint;
 pub use film::Film;
+pub use light_sampling::LightSampling;
 pub use lights::Lights;
 pub use pass::{RayCounts, hurry, trace_adaptive, trace_half, trace_pass};
 pub use scene::{Coverage, Geometry, Surfaces, TraceScene};

@@ -48,7 +48,7 @@ pub fn trace_adaptive(
     }
     if film.is_allotted() {
         // Where only a part is refined, the whole picture would have to wait for it.
-        let again = film.can_allot_again() && film.region().is_none();
+        let again = scene.settings.shares_again && film.can_allot_again() && film.region().is_none();
         if again && film.complete_samples() >= allot::RIPE {
             return share_out_again(scene, film, keep_going);
         }
