@@ -1,6 +1,7 @@
 //! All lights together: which to sample, and which a ray runs into.
 
 use super::emitter::{Emitter, Receiver};
+use super::features::{Feature, count};
 use super::light::FlatLight;
 use super::light_sampling::LightSampling;
 use super::light_tree::LightTree;
@@ -185,6 +186,7 @@ impl Lights {
             return (Pick { light, chance: self.mixed(1.0) }, rest.fract());
         }
         if let Some(chosen) = self.tree.sample(to, rest.fract()) {
+            count(Feature::LightChoice);
             let light = self.placed[chosen.emitter];
             return (Pick { light, chance: self.mixed(chosen.chance) }, chosen.rest);
         }

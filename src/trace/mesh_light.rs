@@ -1,6 +1,7 @@
 //! Emissive meshes: their triangles as one light.
 
 use super::emitter::{Emitter, Receiver};
+use super::features::{Feature, count};
 use super::light::{LightSample, sample_at, sample_flat};
 use super::light_sampling::LightSampling;
 use super::light_tree::LightTree;
@@ -141,6 +142,7 @@ impl MeshLight {
         }
         match self.tree.sample(to, (random - BY_AREA) / (1.0 - BY_AREA)) {
             Some(chosen) => {
+                count(Feature::LightChoice);
                 let i = chosen.emitter;
                 (i, BY_AREA * self.part(i) + (1.0 - BY_AREA) * chosen.chance, chosen.rest)
             }

@@ -14,6 +14,7 @@ pub mod convergence;
 mod diffuse;
 pub mod emitter;
 pub mod explain;
+pub mod features;
 pub mod film;
 pub mod first;
 pub mod guess;
@@ -44,6 +45,7 @@ pub mod visible;
 pub mod warp;
 
 pub use camera::Viewpoint;
+pub use features::FeatureCounts;
 pub use film::Film;
 pub use light_sampling::LightSampling;
 pub use lights::Lights;

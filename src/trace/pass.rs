@@ -2,7 +2,7 @@
 
 use super::film::{TILE, Tile};
 use super::integrator::{Batch, Work};
-use super::{Film, TraceScene, allot, reuse};
+use super::{FeatureCounts, Film, TraceScene, allot, reuse};
 use rayon::prelude::*;
 
 /// Rays by kind.
@@ -14,6 +14,8 @@ pub struct RayCounts {
     pub shadow: u64,
     /// From surface to surface.
     pub bounce: u64,
+    /// What else had to be done for them.
+    pub features: FeatureCounts,
 }
 
 impl RayCounts {
@@ -31,6 +33,7 @@ impl std::ops::Add for RayCounts {
             camera: self.camera + other.camera,
             shadow: self.shadow + other.shadow,
             bounce: self.bounce + other.bounce,
+            features: self.features + other.features,
         }
     }
 }
