@@ -351,7 +351,7 @@ mod tests {
             let app = opened(scene, 24, integrator);
             let truth = brightness(&app, method(OURS), 1000..1032, 128);
             for method in &METHODS {
-                let found = brightness(&app, method, 0..32, 16);
+                let found = brightness(&app, method, 0..32, 64);
                 let bound = 4.5 * found.sigma.hypot(truth.sigma);
                 let off = found.mean - truth.mean;
                 println!("{scene} {}: off {off:+.1e} of {:.3}, bound {bound:.1e}", method.name, truth.mean);
