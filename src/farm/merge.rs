@@ -123,7 +123,7 @@ fn complete(sum: &FilmFile, parts: &[Part], range: &Range<u32>) -> Result<(), Fi
     // All that nobody has is the beginning: perhaps it is to be so.
     let held_from =
         parts.iter().flat_map(|part| &part.held).filter_map(Ranges::hull).map(|hull| hull.start).min();
-    let is_part = held_from.filter(|&from| from > 0 && missing.as_slice() == [0..from]);
+    let is_part = held_from.filter(|&from| from > 0 && missing == Ranges::from(0..from));
     let only = is_part.map_or_else(String::new, |from| {
         format!("; if {from}..{} is all that you want, say --sample-range {from}..{}", range.end, range.end)
     });
