@@ -148,6 +148,8 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
         shafts: default.shafts,
         light_samples: default.light_samples,
         reuse: default.reuse,
+        cuts: default.cuts,
+        shares_again: default.shares_again,
     };
     if let Some(crop) = wishes.crop.filter(|[_, max]| max.cmpgt(settings.size).any()) {
         return Err(OpenError::Crop { crop, size: format!("{}x{}", settings.size.x, settings.size.y) });

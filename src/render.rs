@@ -1,19 +1,19 @@
 //! Headless: frames until there are enough samples, then a file.
 
 use crate::app::{FrameBudget, FrameStats};
-use crate::farm::{self, FilmError, FilmFile, Header, Identity, is_film};
-use crate::image::compare::{CompareError, LinearImage};
-use crate::image::files::{save_image, save_part};
-use crate::image::{Display, ErrorLog, ImageError, save};
+use crate::farm::{FilmError, FilmFile, Header, Identity, is_film};
+use crate::image::compare::LinearImage;
+use crate::image::{Display, ErrorLog, ImageError};
 use crate::load::{Kind, LoadOptions, Phase, SceneSource};
 use crate::open::{OpenError, Opened, Wishes, open};
+use crate::outputs::{NotWritten, folder_exists, save_all};
+use crate::reference::{Reference, ReferenceError};
 use crate::sync::traceable;
 use crate::trace::guess::guessed;
 use crate::trace::{Film, Geometry, RayCounts, RenderSettings};
 use crate::watch::{Seen, Watch};
-use glam::UVec2;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -49,10 +49,13 @@ pub enum RenderError {
     /// The scene cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// A file cannot be written, or a reference not read.
+    /// A file could not be written.
     #[error(transparent)]
     Save(#[from] ImageError),
-    /// A film cannot be gone on with, or not serve as reference.
+    /// One could not be written where it was to go, at the end.
+    #[error(transparent)]
+    NotWritten(#[from] NotWritten),
+    /// A film cannot be gone on with.
     #[error(transparent)]
     Film(#[from] FilmError),
     /// What is of the whole picture only.
@@ -60,9 +63,9 @@ pub enum RenderError {
         "--crop is for .png and .exr: a film, --resume and --reference are of the whole picture; leave it out, or them"
     )]
     OfAPart,
-    /// The reference is of another size.
+    /// The reference cannot be read, is of another size, or of the very samples of the render.
     #[error(transparent)]
-    Reference(#[from] CompareError),
+    Reference(#[from] ReferenceError),
 }
 
 /// How far a render is.
@@ -177,7 +180,9 @@ pub fn render(
         return Err(RenderError::OfAPart);
     }
     let mut scene = open(&job.source, &job.load, &job.wishes)?;
-    let identity = films.then(|| Identity::of(&scene.app.world, job.source.name()));
+    let reference = job.error_log.as_ref().map(|(reference, _)| Reference::open(reference)).transpose()?;
+    let identified = films || reference.as_ref().is_some_and(|reference| reference.seed().is_some());
+    let identity = identified.then(|| Identity::of(&scene.app.world, job.source.name()));
     let (mut planned, mut resumed_samples) = (None, 0.0);
     if let (Some(path), Some(identity)) = (&job.resume, &identity) {
         let file = FilmFile::read(path)?;
@@ -188,19 +193,24 @@ pub fn render(
         scene.report.add(Kind::Decided, &path.display().to_string(), what);
         scene.app.world.insert_resource(film);
     }
-    let size = scene.app.world.resource::<RenderSettings>().size;
-    let log = match &job.error_log {
-        Some((reference, log)) => Some(ErrorLog::create(log, reference_picture(reference, size)?)?),
-        None => None,
-    };
-    opened(&scene);
-    let Opened { mut app, report, load_seconds, build_seconds, samples } = scene;
     // A noise goal is the target, unless the command line sets another beside it.
-    let asked = job.wishes.samples.or(if job.noise.is_some() { None } else { planned.or(samples) });
+    let asked = job.wishes.samples.or(if job.noise.is_some() { None } else { planned.or(scene.samples) });
     let open_end = job.time_limit.is_some() || job.noise.is_some();
     let target = asked.unwrap_or(if open_end { u32::MAX } else { DEFAULT_SAMPLES });
-    let first_sample = app.world.resource::<Film>().first_sample();
+    let first_sample = scene.app.world.resource::<Film>().first_sample();
     let target = target.min(u32::MAX - first_sample);
+    let log = match (reference, &job.error_log) {
+        (Some(reference), Some((_, log))) => {
+            reference.has_size(scene.app.world.resource::<RenderSettings>().size)?;
+            if let Some(identity) = &identity {
+                reference.is_independent(identity, first_sample..first_sample + target)?;
+            }
+            Some(ErrorLog::create(log, reference.picture)?)
+        }
+        _ => None,
+    };
+    opened(&scene);
+    let Opened { mut app, report, load_seconds, build_seconds, .. } = scene;
 
     let region = app.world.resource::<FrameBudget>().region;
     app.world.insert_resource(FrameBudget {
@@ -280,10 +290,7 @@ pub fn render(
         .then(|| first_sample..first_sample + target.max(film.complete_samples()));
     let display = *app.world.resource::<Display>();
     let header = identity.map(|identity| Header::new(identity, planned, &display));
-    match region {
-        Some(part) => each(&job.outputs, |path| save_part(path, film, &display, part))?,
-        None => save_all(&job.outputs, (film, guess.as_ref()), &display, header.as_ref())?,
-    }
+    save_all(&job.outputs, (film, guess.as_ref()), &display, header.as_ref(), region)?;
     if let Some(trouble) = watch.trouble {
         return Err(trouble.into());
     }
@@ -342,63 +349,6 @@ enum End {
     Dark,
     /// From outside.
     Interrupted,
-}
-
-/// Better now than after an hour of tracing.
-fn folder_exists(path: &Path) -> Result<(), ImageError> {
-    match path.parent() {
-        Some(folder) if folder != Path::new("") && !folder.is_dir() => {
-            let source = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder; make it first");
-            Err(ImageError::Io { path: path.to_path_buf(), source })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A picture file or a film to measure errors by.
-///
-/// # Errors
-/// If it cannot be read.
-pub fn open_reference(path: &Path) -> Result<LinearImage, RenderError> {
-    if is_film(path) {
-        return Ok(LinearImage::of(&FilmFile::read(path)?.film));
-    }
-    Ok(LinearImage::open(path)?)
-}
-
-/// The same, of this size.
-fn reference_picture(path: &Path, size: UVec2) -> Result<LinearImage, RenderError> {
-    let reference = open_reference(path)?;
-    if reference.size == size {
-        return Ok(reference);
-    }
-    let (b, size_b) = (path.display().to_string(), reference.size);
-    Err(CompareError::Size { a: "the render".to_owned(), size_a: size, b, size_b }.into())
-}
-
-/// Writes all files, each by its ending; pictures are of the guess if there is one. One that cannot be written does not keep the
-/// others from it.
-///
-/// # Errors
-/// The first failure.
-pub fn save_all(
-    paths: &[PathBuf],
-    (film, guess): (&Film, Option<&LinearImage>),
-    display: &Display,
-    header: Option<&Header>,
-) -> Result<(), ImageError> {
-    let save = |path: &PathBuf| match header {
-        Some(header) if is_film(path) => {
-            farm::format::write(path, header, film, &farm::format::held_by(film))
-        }
-        _ => guess.map_or_else(|| save(path, film, display), |guess| save_image(path, guess, display)),
-    };
-    each(paths, save)
-}
-
-fn each(paths: &[PathBuf], save: impl Fn(&PathBuf) -> Result<(), ImageError>) -> Result<(), ImageError> {
-    let done: Vec<Result<(), ImageError>> = paths.iter().map(save).collect();
-    done.into_iter().collect()
 }
 
 /// From the kernel's own account of this process; `None` where there is no such file.

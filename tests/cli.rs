@@ -58,6 +58,10 @@ fn a_render_writes_what_is_asked_for_and_says_what_it_did() {
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&json["samples"], &json["width"], &json["height"]), (&4.0.into(), &48.into(), &32.into()));
     assert_eq!(json["rays"]["camera"], 48 * 32 * 4);
+    // Of what the scene has not got it says that nothing was done for it.
+    for feature in ["mirror_rays", "texture_lookups", "alpha_tests", "light_choices"] {
+        assert_eq!(json["rays"]["features"][feature], 0, "{feature} in {json}");
+    }
     for key in ["load_seconds", "build_seconds", "render_seconds", "first_picture_seconds", "noise"] {
         assert!(json[key].as_f64().is_some_and(|x| x > 0.0), "{key} in {json}");
     }
@@ -118,6 +122,10 @@ fn exit_codes_are_those_of_the_documentation() {
         (vec!["render", "cornell", "-o", "a.jpg"], 2, vec!["a.jpg", ".png", ".exr"]),
         (vec!["render", "cornell", "--camera", "nobody", "-o", "a.png"], 2, vec!["nobody"]),
         (vec!["render", "cornell", "--resolution", "0x0"], 2, vec!["0x0"]),
+        (vec!["render", "cornell", "--time-limit", "0"], 2, vec!["--time-limit", "0.001 or more"]),
+        (vec!["render", "cornell", "--time-limit=-1"], 2, vec!["--time-limit", "0.001 or more"]),
+        (vec!["render", "cornell", "--time-limit", "nan"], 2, vec!["--time-limit", "0.001 or more"]),
+        (vec!["report", "cornell", "--time", "0"], 2, vec!["--time", "0.001 or more"]),
         (vec!["render", "--sppp", "1"], 2, vec!["--spp"]),
         (
             vec!["render", "cornell", "--resolution", "9x9", "--crop", "3,3,7,2"],

@@ -39,11 +39,11 @@ pub struct ReportArgs {
     /// Runs of each method, with different noise
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub seeds: u32,
-    /// Converged picture (.exr) to measure errors against, instead of making one; of which scene, if there
-    /// are several
+    /// Converged picture (.exr) or film of a seed of its own to measure errors against, instead of making one; of which
+    /// scene, if there are several
     #[arg(long, value_name = "[SCENE=]FILE")]
     pub reference: Vec<String>,
-    /// Seconds to take in all [default: 540, 45 with --quick; at most a third of it for a scene]
+    /// Seconds to take in all [default: 510, 45 with --quick; at most a third of it for a scene]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub time: Option<Duration>,
     /// Threads to trace with; 0 = all
@@ -66,7 +66,7 @@ impl ReportArgs {
         } else {
             self.scenes.iter().map(String::as_str).collect()
         };
-        let (size, total) = if self.quick { (96, 45) } else { (256, 540) };
+        let (size, total) = if self.quick { (96, 45) } else { (256, 510) };
         Ok(ReportJob {
             scenes: names.into_iter().map(SceneSource::parse).collect::<Result<_, _>>()?,
             wishes: Wishes {
@@ -120,4 +120,58 @@ pub struct TortureArgs {
     /// No progress on standard error
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::measure::MOMENTS;
+    use crate::report::methods::{company, methods};
+    use crate::report::plan::Plan;
+    use crate::trace::Integrator;
+    use clap::Parser;
+
+    /// What a run takes beside its tracing, with what belongs to its scene: 0.42 s as measured on two busy cores.
+    const BESIDE: f64 = 0.45;
+
+    #[derive(Parser)]
+    struct Parsed {
+        #[command(flatten)]
+        report: ReportArgs,
+    }
+
+    fn job(arguments: &[&str]) -> ReportJob {
+        Parsed::parse_from(arguments).report.job(Arc::default()).unwrap()
+    }
+
+    #[test]
+    fn by_default_the_table_s_moments_are_reached_in_ten_minutes() {
+        let job = job(&["penumbra"]);
+        for integrator in [Integrator::Direct, Integrator::Path] {
+            // With all methods that there are, also those that make no difference in most scenes.
+            let company = company(methods(integrator, None));
+            let plan = Plan::new(job.total, job.scenes.len(), company, job.seeds);
+            let longest = MOMENTS.into_iter().fold(0.0, f64::max);
+            assert!(plan.ours.first > longest, "the table's {longest} seconds are measured: {plan:?}");
+            assert!(plan.other.first > MOMENTS[1], "{plan:?}");
+            // "RMSE after 1 s" is of all seeds, but where there are more methods than the default scenes have.
+            let least = if integrator == Integrator::Direct { 1.0 } else { 0.9 };
+            assert!(plan.ablation.again > least * MOMENTS[0] * 0.9, "{plan:?}");
+            let runs = (1 + company.others + company.ablations) as f64 * f64::from(job.seeds);
+            let whole = job.scenes.len() as f64 * (plan.seconds(company) + BESIDE * runs);
+            assert!(whole < 600.0, "{whole} s: {plan:?}");
+        }
+    }
+
+    #[test]
+    fn a_quick_report_takes_less_than_a_minute() {
+        let job = job(&["penumbra", "--quick"]);
+        let company = company(methods(Integrator::Path, None));
+        let plan = Plan::new(job.total, job.scenes.len(), company, job.seeds);
+        let runs = (1 + company.others + company.ablations) as f64 * f64::from(job.seeds);
+        // The pictures have a seventh of the pixels; what a pass takes too long is shorter with them.
+        let whole = job.scenes.len() as f64 * (plan.seconds(company) + BESIDE / 7.0 * runs);
+        assert!(whole < 60.0, "{whole} s: {plan:?}");
+        assert!(plan.ours.first > MOMENTS[0] && plan.ablation.again > 0.05, "{plan:?}");
+    }
 }

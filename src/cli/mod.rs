@@ -116,7 +116,7 @@ impl CheckArgs {
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// The picture: PNG, EXR or another common format
+    /// The picture: PNG, EXR or another common format, or a .film
     pub a: PathBuf,
     /// The reference, of the same size
     pub b: PathBuf,
@@ -137,7 +137,7 @@ pub struct MergeArgs {
     /// File to write: .film, .exr or .png; may be given several times
     #[arg(short, long, required = true, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Samples that must be there, no more and no less [default: from the first to the last that a film was to
+    /// Samples that must be there, no more and no less [default: from number 0 to the last that a film was to
     /// hold]
     #[arg(long, value_name = "A..B", value_parser = sample_range)]
     pub sample_range: Option<Range<u32>>,

@@ -71,7 +71,9 @@ pub(super) fn exposure(text: &str) -> Result<f32, String> {
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 =
         text.strip_suffix('s').unwrap_or(text).parse().map_err(|_| format!("\"{text}\" is not a number"))?;
-    Duration::try_from_secs_f64(number).map_err(|e| e.to_string())
+    // In less there is time for nothing.
+    let seconds = Duration::try_from_secs_f64(number).ok().filter(|&time| time >= Duration::from_millis(1));
+    seconds.ok_or_else(|| format!("\"{text}\" is not a time of 0.001 or more, such as 2.5 or 2.5s"))
 }
 
 pub(super) fn noise(text: &str) -> Result<f64, String> {
@@ -127,6 +129,9 @@ mod tests {
         assert_eq!(crop("8, 0,4,300"), Ok([UVec2::new(8, 0), UVec2::new(12, 300)]));
         for wrong in ["8,0,4", "8,0,0,3", "-8,0,4,3", "1,2,3,4,5", "4294967295,0,1,1", ""] {
             assert!(crop(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["0", "-1", "0s", "-0.0", "nan", "inf", "1e-9", "1e30", "", "s", "soon"] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
         }
         for wrong in ["0x5", "5", "ax3", "65536x65536"] {
             assert!(resolution(wrong).is_err(), "{wrong}");

@@ -87,7 +87,7 @@ pub enum FilmError {
         tile: Option<UVec2>,
     },
     /// Samples that nobody has.
-    #[error("samples {missing} are missing{}{whose}; {way_out}", at(*tile))]
+    #[error("samples {missing} are missing{}{whose}; {way_out}{only}", at(*tile))]
     Gap {
         /// Which.
         missing: Ranges,
@@ -97,6 +97,8 @@ pub enum FilmError {
         whose: String,
         /// What to do.
         way_out: &'static str,
+        /// `; if C..D is all that you want, say so`, or nothing.
+        only: String,
     },
     /// Samples outside of what was asked for.
     #[error("{}: holds samples {held}, which are not within {}..{}; leave it out", path.display(), range.start, range.end)]

@@ -56,12 +56,13 @@ impl Identity {
                 Some(Filter::Bilinear) => "bilinear".to_owned(),
             },
             sampling: format!(
-                "{:?}, {:?}, {} light samples{}{}",
+                "{:?}, {:?}, {} light samples{}{}{}",
                 settings.sampling,
                 settings.pixel_sampling.unwrap_or(settings.sampling),
                 settings.light_samples,
                 if settings.shafts { "" } else { ", no shafts" },
-                if settings.reuse { "" } else { ", no reuse" }
+                if settings.reuse { "" } else { ", no reuse" },
+                if settings.cuts { "" } else { ", no cuts" }
             )
             .to_lowercase(),
             seed: settings.seed,

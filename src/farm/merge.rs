@@ -14,7 +14,7 @@ struct Part {
 
 /// Adds up the films in `paths`, in any order: the result is that of a single run. It is shown as the first.
 ///
-/// `wanted` are the samples that must be there, no more and no less; without it, those from the first to the
+/// `wanted` are the samples that must be there, no more and no less; without it, those from the very first, number 0, to the
 /// last that a film holds or was to hold. `allow_gaps` lets some be missing.
 ///
 /// # Errors
@@ -54,13 +54,15 @@ pub fn merge(
         parts.push(Part { path: path.clone(), planned, held });
     }
     let Some(mut sum) = sum else { return Ok(None) };
-    let range = wanted.or_else(|| required(&parts));
+    let hull = wanted.clone().or_else(|| hull(&parts));
+    // Without a word about the range it begins with sample 0: else nobody would see that the first part is missing.
+    let range = wanted.or_else(|| hull.as_ref().map(|hull| 0..hull.end));
     if !allow_gaps && let Some(range) = &range {
         complete(&sum, &parts, range)?;
     }
     // As a single run would have planned it, if all parts had a plan.
     let all_planned = parts.iter().all(|part| part.planned.is_some());
-    sum.header.planned = range.filter(|_| all_planned);
+    sum.header.planned = hull.filter(|_| all_planned);
     Ok(Some(sum))
 }
 
@@ -89,7 +91,7 @@ fn apart(part: &Part, path: &Path, held: &[Ranges], film: &Film) -> Result<(), F
 
 /// From the first to the last sample that the films were to hold. A film without a plan was to hold what all
 /// its tiles have: a render that was stopped by the clock ends unevenly, and that is no gap.
-fn required(parts: &[Part]) -> Option<Range<u32>> {
+fn hull(parts: &[Part]) -> Option<Range<u32>> {
     let of_part = |part: &Part| {
         part.planned.clone().or_else(|| {
             let start = part.held.iter().filter_map(Ranges::hull).map(|hull| hull.start).min()?;
@@ -118,7 +120,14 @@ fn complete(sum: &FilmFile, parts: &[Part], range: &Range<u32>) -> Result<(), Fi
         ),
         _ => (String::new(), "render them (`render … --sample-range`), or merge with --allow-gaps"),
     };
-    Err(FilmError::Gap { missing, tile, whose, way_out })
+    // All that nobody has is the beginning: perhaps it is to be so.
+    let held_from =
+        parts.iter().flat_map(|part| &part.held).filter_map(Ranges::hull).map(|hull| hull.start).min();
+    let is_part = held_from.filter(|&from| from > 0 && missing == Ranges::from(0..from));
+    let only = is_part.map_or_else(String::new, |from| {
+        format!("; if {from}..{} is all that you want, say --sample-range {from}..{}", range.end, range.end)
+    });
+    Err(FilmError::Gap { missing, tile, whose, way_out, only })
 }
 
 fn everywhere(held: &[Ranges]) -> bool {

@@ -72,6 +72,9 @@ impl LinearImage {
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         let bytes =
             std::fs::read(path).map_err(|source| ImageError::Io { path: path.to_path_buf(), source })?;
+        if image::guess_format(&bytes).is_err() {
+            return Err(ImageError::NotAPicture { path: path.to_path_buf() });
+        }
         let image = image::load_from_memory(&bytes)
             .map_err(|source| ImageError::Codec { path: path.to_path_buf(), source })?;
         let linear =

@@ -29,7 +29,14 @@ pub enum ImageError {
         /// Its reason.
         source: std::io::Error,
     },
-    /// Not a picture, or a broken one.
+    /// Something else.
+    #[error("{}: is no picture; give a .png, an .exr or another common format, or a film that ends in .film",
+            path.display())]
+    NotAPicture {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A picture that cannot be read, or a broken one.
     #[error("{}: {source}", path.display())]
     Codec {
         /// The file.

@@ -7,7 +7,9 @@ use crate::app::App;
 use crate::image::compare::{Difference, LinearImage};
 use crate::sync;
 use crate::trace::noise::relative_noise;
-use crate::trace::{Film, RayCounts, RenderSettings, TraceScene, trace_adaptive, trace_pass};
+use crate::trace::{
+    FeatureCounts, Film, LightSampling, RayCounts, RenderSettings, TraceScene, trace_adaptive, trace_pass,
+};
 use glam::Vec3;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,6 +63,10 @@ pub struct Performance {
     pub shadow_rays_per_second: f64,
     /// From surface to surface.
     pub bounce_rays_per_second: f64,
+    /// What else had to be done, in all.
+    pub features: FeatureCounts,
+    /// The same for each camera ray: mirror rays, texture lookups, alpha tests, choices among many lights.
+    pub features_per_camera_ray: [f64; 4],
     /// Seconds of tracing until the noise number is below 5, 2 and 1 %.
     pub seconds_to_noise: [Option<f64>; 3],
     /// RMSE after 1, 5 and 30 seconds of tracing.
@@ -206,8 +212,10 @@ pub fn run(
 ) -> (Run, Option<LinearImage>) {
     let mut settings = RenderSettings { seed, ..subject.settings };
     (method.apply)(&mut settings);
-    let mut tracing =
-        Tracing::new(traceable(subject.app, &settings), subject.interrupt).adaptive(method.adaptive);
+    let scene = traceable(subject.app, &settings);
+    let lights = (method.lights != LightSampling::BEST).then(|| scene.lights.sampled(method.lights));
+    let scene = TraceScene { lights: lights.as_ref().unwrap_or(scene.lights), ..scene };
+    let mut tracing = Tracing::new(scene, subject.interrupt).adaptive(method.adaptive);
     let mut run = Run { seed, ..Run::default() };
     let mut kept = None;
     'run: for checkpoint in checkpoints() {
@@ -252,11 +260,16 @@ impl Performance {
             MOMENTS.map(|seconds| value_at(&errors, seconds))
         };
         let per_second = |rays: u64| rays as f64 / last.seconds;
+        let features = run.rays.features;
+        let counts =
+            [features.mirror_rays, features.texture_lookups, features.alpha_tests, features.light_choices];
         Self {
             samples_per_second: f64::from(last.samples) / last.seconds,
             camera_rays_per_second: per_second(run.rays.camera),
             shadow_rays_per_second: per_second(run.rays.shadow),
             bounce_rays_per_second: per_second(run.rays.bounce),
+            features,
+            features_per_camera_ray: counts.map(|count| count as f64 / run.rays.camera.max(1) as f64),
             seconds_to_noise: NOISE_LEVELS.map(|level| first_below(&noise, level)),
             rmse_after: after(Measure::All),
             rmse_surfaces_after: after(Measure::Surfaces),
@@ -285,7 +298,7 @@ mod tests {
             rmse_surfaces: None,
             noise: Some(rmse),
         };
-        let rays = RayCounts { camera: 64, shadow: 128, bounce: 0 };
+        let rays = RayCounts { camera: 64, shadow: 128, ..RayCounts::default() };
         let run = Run { seed: 0, points: vec![point(1, 0.25, 0.08), point(16, 4.0, 0.02)], rays };
         let performance = Performance::of(&run);
         assert_eq!(performance.samples_per_second, 4.0);

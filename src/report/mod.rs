@@ -30,6 +30,7 @@ pub use write::write;
 use crate::image::ImageError;
 use crate::load::SceneSource;
 use crate::open::{OpenError, Wishes};
+use crate::reference::ReferenceError;
 use glam::UVec2;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -94,6 +95,18 @@ pub enum ReportError {
         /// The scenes.
         scenes: String,
     },
+    /// A reference cannot be read.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// A reference may hold the samples of runs that are measured.
+    #[error("{}: was made with seed {seed}, and the runs of a report have the seeds below {}: their errors would come out too \
+             small; make it with another, such as --seed 12345", path.display(), reference::OWN_SEEDS)]
+    ReferenceSeed {
+        /// The reference.
+        path: PathBuf,
+        /// Its seed.
+        seed: u32,
+    },
     /// A reference holds values that are not finite.
     #[error("{}: the reference has {count} values that are not finite", path.display())]
     ReferenceBroken {
@@ -117,8 +130,6 @@ pub struct Report {
     pub version: &'static str,
     /// What it ran on.
     pub machine: machine::Machine,
-    /// Seconds given to each part, for one scene.
-    pub plan: plan::Plan,
     /// Scene by scene.
     pub scenes: Vec<SceneReport>,
     /// Stopped before everything was measured.
@@ -140,6 +151,8 @@ pub struct SceneReport {
     pub max_depth: u32,
     /// What it is and how fast.
     pub facts: facts::Facts,
+    /// Seconds given to each part.
+    pub plan: plan::Plan,
     /// What errors are measured against.
     pub reference: reference::ReferenceFacts,
     /// Speed and error of our own method, from its longest run.

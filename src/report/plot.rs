@@ -24,7 +24,7 @@ const PAPER_HEX: &str = "#FEFEFE";
 const PAPER: RGBColor = RGBColor(0xfe, 0xfe, 0xfe);
 /// Told apart by those who see few colours, on white and on black: after Okabe and Ito, "Color Universal
 /// Design", 2008. Ours gets the strongest.
-const COLORS: [(&str, RGBColor); 7] = [
+const COLORS: [(&str, RGBColor); 14] = [
     (RANDOM, RGBColor(0xd5, 0x5e, 0x00)),
     ("stratified", RGBColor(0xcc, 0x79, 0xa7)),
     (OURS, RGBColor(0x1f, 0x83, 0xc4)),
@@ -32,6 +32,14 @@ const COLORS: [(&str, RGBColor); 7] = [
     ("shifted", RGBColor(0x00, 0x9e, 0x73)),
     ("random-pixel", RGBColor(0xe6, 0x9f, 0x00)),
     ("random-light", RGBColor(0x8a, 0x8d, 0x93)),
+    // More than can be told apart for sure: the tables say it in numbers.
+    ("no-shares-again", RGBColor(0x7a, 0x5c, 0xc4)),
+    ("no-shafts", RGBColor(0xb0, 0x2a, 0x30)),
+    ("no-cuts", RGBColor(0x9a, 0x6b, 0x2f)),
+    ("no-warp", RGBColor(0x5f, 0x8f, 0x1d)),
+    ("no-solid-angle", RGBColor(0x2b, 0x8c, 0x8c)),
+    ("no-light-tree", RGBColor(0xa8, 0x9a, 0x00)),
+    ("one-light-sample", RGBColor(0xe0, 0x6a, 0x9a)),
 ];
 const SIZE: (u32, u32) = (780, 440);
 const LEGEND_WIDTH: u32 = 168;

@@ -95,15 +95,22 @@ pub struct Reference {
 
 /// No run that is measured has this seed: it must not share its samples with the reference.
 const SEED: u32 = 0x5eed_0fff;
+/// All of theirs are below this.
+pub const OWN_SEEDS: u32 = 10_000;
 /// One made in a little less time is as good.
 const AS_GOOD: f64 = 0.8;
 
-/// Reads a given one and checks that it fits.
+/// Reads a given one, a picture or a film, and checks that it fits.
 ///
 /// # Errors
-/// If it cannot be read, has another size than `wanted`, or holds values that are not finite.
+/// If it cannot be read, has another size than `wanted`, holds values that are not finite, or is a film of samples that may be
+/// those of a run.
 pub fn given(path: &Path, scene: &str, wanted: UVec2) -> Result<Reference, ReportError> {
-    let picture = LinearImage::open(path)?;
+    let given = crate::reference::Reference::open(path)?;
+    if let Some(seed) = given.seed().filter(|&seed| seed < OWN_SEEDS) {
+        return Err(ReportError::ReferenceSeed { path: path.into(), seed });
+    }
+    let picture = given.picture;
     if picture.size != wanted {
         let scene = scene.to_owned();
         return Err(ReportError::ReferenceSize { path: path.into(), scene, found: picture.size, wanted });

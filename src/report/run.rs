@@ -4,7 +4,7 @@ use super::curve::{Findings, Measure};
 use super::facts::Facts;
 use super::machine::Machine;
 use super::measure::{Performance, Run, Subject, Tracing, run, surfaces, traceable};
-use super::methods::{Method, OURS, RANDOM, methods};
+use super::methods::{Method, OURS, RANDOM, company, methods};
 use super::pictures::Pictures;
 use super::plan::Plan;
 use super::reference::{self, Reference};
@@ -56,24 +56,22 @@ pub fn measure_all(
     job: &ReportJob,
     mut progress: impl FnMut(&ReportProgress),
 ) -> Result<Report, ReportError> {
-    let others = methods(job.wishes.integrator.unwrap_or_default()).count() - 1;
-    let plan = Plan::new(job.total, job.scenes.len(), others, job.seeds);
     let size = job.wishes.size.unwrap_or(RenderSettings::default().size);
     let names = names(&job.scenes);
     let mut given = given_references(&job.references, &names, size)?;
     prepare_folder(&job.folder)?;
-    let total = plan.seconds(others) * job.scenes.len() as f64;
+    let share = Plan::share(job.total, job.scenes.len());
+    let total = share * job.scenes.len() as f64;
     let mut clock = Clock { total, done: 0.0, tell: &mut progress };
     let mut report = Report {
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine::here(),
-        plan,
         scenes: Vec::new(),
         interrupted: false,
     };
     for (i, (source, name)) in job.scenes.iter().zip(&names).enumerate() {
-        clock.done = plan.seconds(others) * i as f64;
-        if let Some(scene) = measure_scene(job, source, name, given.remove(name), &plan, &mut clock)? {
+        clock.done = share * i as f64;
+        if let Some(scene) = measure_scene(job, source, name, given.remove(name), &mut clock)? {
             report.scenes.push(scene);
         }
         if job.interrupt.load(Ordering::Relaxed) {
@@ -89,7 +87,6 @@ fn measure_scene(
     source: &SceneSource,
     name: &str,
     given: Option<Reference>,
-    plan: &Plan,
     clock: &mut Clock,
 ) -> Result<Option<SceneReport>, ReportError> {
     clock.at(0.0, &format!("{name}: opening"));
@@ -102,6 +99,9 @@ fn measure_scene(
         return Ok(None);
     }
     let facts = Facts::of(&app, opening + first.seconds);
+    let compared: Vec<&'static Method> =
+        methods(settings.integrator, Some(traceable(&app, &settings).lights)).collect();
+    let plan = Plan::new(job.total, job.scenes.len(), company(compared.iter().copied()), job.seeds);
     drop(first);
     let mask = surfaces(&app, &settings);
     let mask = mask.as_deref();
@@ -127,7 +127,7 @@ fn measure_scene(
         surfaces: mask,
         interrupt: &job.interrupt,
     };
-    let (measured, kept) = all_methods(&subject, name, plan, clock);
+    let (measured, kept) = all_methods(&subject, &compared, name, &plan, clock);
     let methods = method_reports(measured, |measure| reference.facts.standard_error(measure));
     let performance = methods
         .iter()
@@ -150,6 +150,7 @@ fn measure_scene(
         integrator: settings.integrator.name(),
         max_depth: settings.max_depth,
         facts,
+        plan,
         performance,
         methods,
         noise_check,
@@ -163,16 +164,21 @@ type Kept = Vec<(&'static str, LinearImage)>;
 
 /// The first runs of all methods, then the second ones and so on, so that an interruption leaves some of
 /// each; and of each first run its picture.
-fn all_methods(subject: &Subject, name: &str, plan: &Plan, clock: &mut Clock) -> (Measured, Kept) {
-    let mut measured: Measured =
-        methods(subject.settings.integrator).map(|method| (method, Vec::new())).collect();
+fn all_methods(
+    subject: &Subject,
+    methods: &[&'static Method],
+    name: &str,
+    plan: &Plan,
+    clock: &mut Clock,
+) -> (Measured, Kept) {
+    let mut measured: Measured = methods.iter().map(|&method| (method, Vec::new())).collect();
     let mut kept = Vec::new();
     for seed in 0..plan.seeds {
         for (method, runs) in &mut measured {
             if subject.interrupt.load(Ordering::Relaxed) {
                 return (measured, kept);
             }
-            let seconds = plan.run(method.name == OURS, seed);
+            let seconds = plan.run(method.kind(), seed);
             let what = format!("{name}: {}, run {} of {}", method.title, seed + 1, plan.seeds);
             let (run, picture) = run(subject, method, seed, seconds, |s| clock.at(s, &what));
             clock.done += seconds;

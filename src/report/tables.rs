@@ -23,6 +23,9 @@ pub const NOTHING: &str = "–";
 /// Marks an error that the reference is not good enough for.
 const LIMITED: &str = " †";
 
+/// What only some scenes pay for.
+const FEATURES: [&str; 4] = ["mirror rays", "texture lookups", "alpha tests", "choices among many lights"];
+
 /// Three significant digits.
 #[must_use]
 pub fn figure(x: f64) -> String {
@@ -69,6 +72,12 @@ pub fn performance(report: &Report) -> Table {
     row("camera rays, million/s", &|s| figure(s.performance.camera_rays_per_second * 1e-6));
     row("shadow rays, million/s", &|s| figure(s.performance.shadow_rays_per_second * 1e-6));
     row("bounce rays, million/s", &|s| figure(s.performance.bounce_rays_per_second * 1e-6));
+    for (i, name) in FEATURES.iter().enumerate() {
+        row(&format!("{name}, for each camera ray"), &|s| match s.performance.features_per_camera_ray[i] {
+            0.0 => "0".to_owned(),
+            some => figure(some),
+        });
+    }
     for (i, moment) in MOMENTS.iter().enumerate() {
         let name = format!("RMSE after {moment} s");
         row(&name, &|s| error(s.performance.rmse_after[i], s.reference.standard_error(Measure::All)));

@@ -4,6 +4,7 @@
 use super::bsdf::Lobes;
 use super::connect::{Look, looks, power_heuristic};
 use super::emitter::Receiver;
+use super::features::{Feature, count};
 use super::integrator::Batch;
 use super::light::FlatLight;
 use super::lights::LightHit;
@@ -146,7 +147,10 @@ impl Batch {
         }
         let origin = match sample.pdf {
             Some(_) => at.lit_origin_toward(sample.wi),
-            None => at.origin_toward(sample.wi),
+            None => {
+                count(Feature::MirrorRay);
+                at.origin_toward(sample.wi)
+            }
         };
         let absorption = path.absorption_toward(surface, at, sample.wi);
         self.next.push(Path {

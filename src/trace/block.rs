@@ -4,7 +4,7 @@
 //! compiles them for each instruction set. They do the same operations in all of them, so all give the same bits.
 
 use super::light::error_of;
-use super::quad::Quad;
+use super::quad::{Place, Quad};
 use super::sampler::{Sampler, SamplerRow};
 use super::surface::{Interaction, UNIT};
 use super::warp::{cosine_hemisphere, offset};
@@ -235,8 +235,9 @@ fn set_found(block: &mut Block, i: usize, position: DVec3, facet: DVec3, error: 
     block.origin.set(i, offset(position, error, normal));
 }
 
-/// One sample of a parallelogram light for each point that is not `certain` yet; those that it is `near` need another.
-pub struct SampleQuad<'a> {
+/// One sample of a parallelogram light for each point that is not `certain` yet; those that it is `near` need another. By
+/// nearly what places bring if `PRODUCT`, else evenly: decided when compiled, for it would be asked at each point.
+pub struct SampleQuad<'a, const PRODUCT: bool> {
     /// The points.
     pub block: &'a Block,
     /// Random numbers.
@@ -257,7 +258,7 @@ pub struct SampleQuad<'a> {
     pub out: &'a mut Arrivals,
 }
 
-impl Job for SampleQuad<'_> {
+impl<const PRODUCT: bool> Job for SampleQuad<'_, PRODUCT> {
     type Output = ();
 
     #[inline(always)]
@@ -265,14 +266,15 @@ impl Job for SampleQuad<'_> {
         let Self { block, samplers, quad, radiance, two_sided, dimension, members, shared, out } = self;
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         samplers.pairs(dimension, &mut x, &mut y);
-        sample_quad([&x, &y], block, quad, radiance, [two_sided, shared], 1.0 / members, out);
+        let sides = [two_sided, shared];
+        sample_quad::<PRODUCT>([&x, &y], block, quad, radiance, sides, 1.0 / members, out);
     }
 }
 
 /// References of its own: of those in a struct the compiler does not know that they are of different things, and makes no
 /// vectors.
 #[inline(always)]
-fn sample_quad(
+fn sample_quad<const PRODUCT: bool>(
     [x, y]: [&Row; 2],
     block: &Block,
     quad: &Quad,
@@ -284,7 +286,9 @@ fn sample_quad(
     let sharing = f32::from(u8::from(shared));
     for i in 0..LANES {
         let (point, normal) = (block.position.get(i), block.normal.get(i));
-        let place = quad.brightness(point, normal).sample(Vec2::new(x[i], y[i]));
+        let random = Vec2::new(x[i], y[i]);
+        let place =
+            if PRODUCT { quad.brightness(point, normal).sample(random) } else { Place::evenly(random) };
         let on_light = quad.at(&place);
         let d = on_light - point;
         let distance2 = d.length_squared();

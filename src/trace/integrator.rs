@@ -9,6 +9,7 @@ use super::block::LANES;
 use super::camera::LookOut;
 use super::connect::{RaysToLights, Shadow};
 use super::diffuse::Diffuse;
+use super::features;
 use super::film::Tile;
 use super::pass::RayCounts;
 use super::path::Path;
@@ -149,6 +150,8 @@ impl Batch {
 
     /// Finds the radiance of all samples in `keys`.
     pub(super) fn follow(&mut self, scene: &TraceScene, size: UVec2, rays: &mut RayCounts) {
+        // What others have looked up in this thread is not ours.
+        let _ = features::take();
         self.look(scene, size);
         self.radiance.clear();
         // What is shared comes after what is each one's own.
@@ -164,6 +167,7 @@ impl Batch {
             self.wave(scene, rays);
         }
         rays.shadow += self.share(scene);
+        rays.features = rays.features + features::take();
     }
 
     /// Makes the camera rays.

@@ -1,7 +1,9 @@
 //! All lights together: which to sample, and which a ray runs into.
 
 use super::emitter::{Emitter, Receiver};
+use super::features::{Feature, count};
 use super::light::FlatLight;
+use super::light_sampling::LightSampling;
 use super::light_tree::LightTree;
 use super::shape_light::{ShapeHit, ShapeLight};
 use crate::bvh::{Aabb, Bvh, Probe, Ray, Shaft};
@@ -31,6 +33,8 @@ pub struct Lights {
     beyond: Vec<u32>,
     /// (instance, material slot) → light, sorted.
     meshes: Vec<((u32, u16), u32)>,
+    /// One of many is always chosen evenly: without the tree.
+    all_alike: bool,
 }
 
 /// Some of the solid shapes: a hierarchy over them, and their numbers among all lights.
@@ -115,7 +119,27 @@ impl Lights {
             })
             .map(|(i, _)| i)
             .collect();
-        Self { tree, emitters, placed, places, unplaced, seen, unseen, beyond, meshes, lights }
+        let all_alike = false;
+        Self { tree, emitters, placed, places, unplaced, seen, unseen, beyond, meshes, lights, all_alike }
+    }
+
+    /// The same lights, sampled otherwise: to compare.
+    #[must_use]
+    pub fn sampled(&self, sampling: LightSampling) -> Self {
+        let mut lights = Self { all_alike: !sampling.tree, ..self.clone() };
+        for light in &mut lights.lights {
+            match light {
+                FlatLight::Shape(shape) => shape.sampling = sampling,
+                FlatLight::Mesh(mesh) => mesh.sample_so(sampling),
+                _ => {}
+            }
+        }
+        lights
+    }
+
+    /// Each of them.
+    pub fn iter(&self) -> impl Iterator<Item = &FlatLight> {
+        self.lights.iter()
     }
 
     /// Light number `index`.
@@ -149,11 +173,17 @@ impl Lights {
         if self.samples_all(depth) {
             return Some((Pick { light: index as u32, chance: 1.0 }, random));
         }
+        if self.all_alike {
+            let place = random * self.lights.len() as f32;
+            let light = (place as usize).min(self.lights.len() - 1) as u32;
+            return Some((Pick { light, chance: self.chance(depth, light, to) }, place.fract()));
+        }
         let place = random * self.groups();
         if let Some(&light) = self.unplaced.get(place as usize) {
             return Some((Pick { light, chance: 1.0 / self.groups() }, place.fract()));
         }
         let chosen = self.tree.sample(to, place.fract())?;
+        count(Feature::LightChoice);
         let light = self.placed[chosen.emitter];
         Some((Pick { light, chance: chosen.chance / self.groups() }, chosen.rest))
     }
@@ -163,6 +193,9 @@ impl Lights {
     pub fn chance(&self, depth: u32, light: u32, to: &Receiver) -> f32 {
         if self.samples_all(depth) {
             return 1.0;
+        }
+        if self.all_alike {
+            return 1.0 / self.lights.len() as f32;
         }
         let among = match self.places[light as usize] {
             u32::MAX => 1.0,

@@ -1,7 +1,9 @@
 //! Emissive meshes: their triangles as one light.
 
 use super::emitter::{Emitter, Receiver};
+use super::features::{Feature, count, count_times};
 use super::light::{LightSample, sample_at, sample_flat};
+use super::light_sampling::LightSampling;
 use super::light_tree::{Chosen, LightTree};
 use super::spherical::{SphericalTriangle, meet, weights};
 use crate::bvh::Aabb;
@@ -25,6 +27,8 @@ pub struct MeshLight {
     pub(crate) two_sided: bool,
     /// The placement mirrors: the front is where `corners` run clockwise.
     pub(crate) mirrored: bool,
+    /// How places on it are chosen.
+    sampling: LightSampling,
     /// All of them together, as if they shone with luminance 1.
     shape: Emitter,
     luminance: f32,
@@ -91,6 +95,20 @@ impl MeshLight {
         Some(light)
     }
 
+    /// Whether its triangles are chosen by what they may bring.
+    #[must_use]
+    pub fn has_tree(&self) -> bool {
+        !self.tree.is_empty()
+    }
+
+    /// Chooses triangles and places otherwise.
+    pub(super) fn sample_so(&mut self, sampling: LightSampling) {
+        self.sampling = sampling;
+        if !sampling.tree {
+            self.tree = Arc::default();
+        }
+    }
+
     /// What a choice among many lights needs to know.
     pub(super) fn emitter(&self) -> Emitter {
         self.shape.times(self.luminance)
@@ -109,7 +127,8 @@ impl MeshLight {
 
     /// Chooses a triangle by a number in [0, 1).
     fn choose(&self, to: &Receiver, random: f32) -> Option<Chosen> {
-        if !self.tree.is_empty() {
+        if self.has_tree() {
+            count(Feature::LightChoice);
             return self.tree.sample(to, random);
         }
         let last = self.cumulative.len().checked_sub(1)?;
@@ -119,9 +138,10 @@ impl MeshLight {
         Some(Chosen { emitter, chance, rest: ((random - below) / chance).clamp(0.0, 1.0) })
     }
 
-    /// Chooses a triangle for each of these, if it [`MeshLight::is_many`].
+    /// Chooses a triangle for each of these, if it [`MeshLight::has_tree`].
     pub(super) fn choose_all(&self, wanted: &[(Receiver, f32)], chosen: &mut [Option<Chosen>]) {
         self.tree.sample_all(wanted, chosen);
+        count_times(Feature::LightChoice, wanted.len());
     }
 
     /// Probability of choosing number `i`.
@@ -142,7 +162,7 @@ impl MeshLight {
         let at = |[b1, b2]: [f32; 2]| a * (1.0 - b1 - b2) + b * b1 + c * b2;
         let cross = (b - a).cross(c - a);
         let normal = cross.try_normalize()? * if self.mirrored { -1.0 } else { 1.0 };
-        let (sample, [b1, b2]) = if is_near(corners, point) {
+        let (sample, [b1, b2]) = if self.is_near(corners, point) {
             let seen = seen_from(corners, point)?;
             let corners = corners.map(Vec3::as_dvec3);
             let position = meet(&corners, point, seen.sample(f64::from(rest), f64::from(second)))?;
@@ -162,12 +182,16 @@ impl MeshLight {
         })
     }
 
+    fn is_near(&self, corners: &[Vec3; 3], point: Vec3) -> bool {
+        self.sampling.solid_angle && is_near(corners, point)
+    }
+
     /// Density in solid angle of sampling `triangle` for a point at this distance and cosine at the light.
     #[must_use]
     pub fn pdf(&self, triangle: u32, to: &Receiver, distance2: f32, cos: f32) -> f32 {
         let Ok(i) = self.triangles.binary_search(&triangle) else { return 0.0 };
         let share = self.chance(to, i);
-        if is_near(&self.corners[i], to.point) {
+        if self.is_near(&self.corners[i], to.point) {
             return seen_from(&self.corners[i], to.point)
                 .map_or(0.0, |seen| (f64::from(share) / seen.solid_angle) as f32);
         }

@@ -2,7 +2,7 @@
 
 use super::film::{TILE, Tile};
 use super::integrator::{Batch, Work};
-use super::{Film, TraceScene, allot, reuse};
+use super::{FeatureCounts, Film, TraceScene, allot, reuse};
 use rayon::prelude::*;
 
 /// Rays by kind.
@@ -14,6 +14,8 @@ pub struct RayCounts {
     pub shadow: u64,
     /// From surface to surface.
     pub bounce: u64,
+    /// What else had to be done for them.
+    pub features: FeatureCounts,
 }
 
 impl RayCounts {
@@ -31,6 +33,7 @@ impl std::ops::Add for RayCounts {
             camera: self.camera + other.camera,
             shadow: self.shadow + other.shadow,
             bounce: self.bounce + other.bounce,
+            features: self.features + other.features,
         }
     }
 }
@@ -48,7 +51,7 @@ pub fn trace_adaptive(
     }
     if film.is_allotted() {
         // Where only a part is refined, the whole picture would have to wait for it.
-        let again = film.can_allot_again() && film.region().is_none();
+        let again = scene.settings.shares_again && film.can_allot_again() && film.region().is_none();
         if again && film.complete_samples() >= allot::RIPE {
             return share_out_again(scene, film, keep_going);
         }

@@ -39,6 +39,15 @@ pub struct Place {
     pub density: f32,
 }
 
+impl Place {
+    /// The place for two numbers in [0, 1), all places alike.
+    #[inline(always)]
+    #[must_use]
+    pub fn evenly(random: Vec2) -> Self {
+        Self { a: random.x, b: random.y, density: 1.0 }
+    }
+}
+
 impl Quad {
     /// Between these edges.
     #[must_use]

@@ -37,6 +37,7 @@ pub(super) fn compute_quad(
         for i in 0..block.count {
             if !out.certain[i]
                 && let Some(which) = which[i]
+                && (scene.settings.cuts || which == 0)
                 && let Some(irradiance) = seen_past(block, i, shape, quad, sightlines, light, which)
             {
                 out.contribution.set(i, block.throughput.get(i) * radiance * (irradiance / PI));
@@ -60,21 +61,39 @@ pub(super) fn sample_quad(
     let Shape::Parallelogram(quad) = &shape.shape else { return };
     let (radiance, two_sided) = (&shape.radiance, shape.two_sided);
     let shared = scene.settings.integrator == Integrator::Path;
-    scene.geometry.tlas.isa().run(SampleQuad {
-        block,
-        samplers,
-        quad,
-        radiance,
-        two_sided,
-        dimension,
-        members: members as f32,
-        shared,
-        out,
-    });
+    let (isa, members) = (scene.geometry.tlas.isa(), members as f32);
+    if shape.sampling.product {
+        isa.run(SampleQuad::<true> {
+            block,
+            samplers,
+            quad,
+            radiance,
+            two_sided,
+            dimension,
+            members,
+            shared,
+            out: &mut *out,
+        });
+    } else {
+        isa.run(SampleQuad::<false> {
+            block,
+            samplers,
+            quad,
+            radiance,
+            two_sided,
+            dimension,
+            members,
+            shared,
+            out: &mut *out,
+        });
+    }
+    if !shape.sampling.solid_angle {
+        return;
+    }
     for i in 0..block.count {
         if out.near[i] {
             let random = samplers.get(i).pair(dimension);
-            sample_near(block, i, shape, (random, members as f32), shared, out);
+            sample_near(block, i, shape, (random, members), shared, out);
         }
     }
 }

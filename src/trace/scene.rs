@@ -2,6 +2,7 @@
 
 use super::bsdf::Passed;
 use super::emitter::Receiver;
+use super::features::{Feature, count};
 use super::lights::Lights;
 use super::texture::lookup;
 use super::{RenderSettings, Viewpoint};
@@ -179,6 +180,7 @@ impl<'a> TraceScene<'a> {
     pub fn texture(&self, texture: Option<TextureIndex>, uvs: [Vec2; 2]) -> Vec4 {
         let Some(TextureIndex { index, uv_transform, second_uvs }) = texture else { return Vec4::ONE };
         let Some(texture) = self.surfaces.textures.get(index as usize) else { return Vec4::ONE };
+        count(Feature::TextureLookup);
         let filter = self.settings.filter.unwrap_or(texture.filter);
         lookup(texture, filter, uv_transform.transform_point2(uvs[usize::from(second_uvs)]))
     }
@@ -258,6 +260,7 @@ impl<'a> TraceScene<'a> {
     pub(super) fn coverage_at(&self, hit: &Hit) -> f32 {
         let (instance, surface) = self.surface_at(hit);
         let alpha = || {
+            count(Feature::AlphaTest);
             let corners = instance.mesh.triangles[hit.triangle as usize];
             let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
             let uvs = both_uvs(&instance.mesh, corners, weights);

@@ -29,6 +29,10 @@ pub struct RenderSettings {
     pub light_samples: u32,
     /// Whether neighbours share what their paths find.
     pub reuse: bool,
+    /// Whether light is computed also where something is in its way, by cutting the lamp; only with `shafts`.
+    pub cuts: bool,
+    /// Whether shares of samples are found anew when more is known.
+    pub shares_again: bool,
 }
 
 /// As measured: with 1 the squared error in direct light after equal time is 1.5 times as large; with 4 it is larger in the
@@ -98,6 +102,8 @@ impl Default for RenderSettings {
             shafts: true,
             light_samples: LIGHT_SAMPLES,
             reuse: true,
+            cuts: true,
+            shares_again: true,
         }
     }
 }

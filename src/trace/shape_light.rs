@@ -2,7 +2,8 @@
 
 use super::emitter::Emitter;
 use super::light::{LightSample, error_of, sample_at, sample_flat};
-use super::quad::Quad;
+use super::light_sampling::LightSampling;
+use super::quad::{Place, Quad};
 use super::spherical::{SphericalQuad, meet, weights};
 use super::warp::{cone, cone_pdf, offset, uniform_sphere};
 use crate::bvh::{Aabb, Ray};
@@ -21,6 +22,8 @@ pub struct ShapeLight {
     pub two_sided: bool,
     /// Seen by rays, and stops them.
     pub visible: bool,
+    /// How places on it are chosen.
+    pub sampling: LightSampling,
     /// Of the front; zero if it is round.
     normal: Vec3,
     area: f32,
@@ -67,7 +70,8 @@ impl ShapeLight {
         let bounds = shape.bounds();
         let reach = bounds.min.abs().max(bounds.max.abs()).element_sum();
         let (normal, area) = (shape.normal(), shape.area());
-        Self { shape, radiance, two_sided, visible, normal, area, reach }
+        let sampling = LightSampling::BEST;
+        Self { shape, radiance, two_sided, visible, sampling, normal, area, reach }
     }
 
     /// What a choice among many needs to know.
@@ -84,7 +88,7 @@ impl ShapeLight {
     /// A direction toward it from `point` with `normal`; see [`super::light::FlatLight::sample`].
     pub(super) fn sample(&self, point: Vec3, normal: Vec3, u: Vec2) -> Option<LightSample> {
         match &self.shape {
-            Shape::Parallelogram(quad) if quad.is_near(point) => {
+            Shape::Parallelogram(quad) if self.sampling.solid_angle && quad.is_near(point) => {
                 let seen = SphericalQuad::new(quad, point)?;
                 let corners = quad.corners().map(Vec3::as_dvec3);
                 let position = meet(&corners, point, seen.sample(u)?)?;
@@ -93,7 +97,11 @@ impl ShapeLight {
                 sample_at(point, position.as_vec3(), self.normal, pdf, self.two_sided, radiance)
             }
             Shape::Parallelogram(quad) => {
-                let place = quad.brightness(point, normal).sample(u);
+                let place = if self.sampling.product {
+                    quad.brightness(point, normal).sample(u)
+                } else {
+                    Place::evenly(u)
+                };
                 // Also where a corner is at the very point.
                 if place.density.is_nan() || place.density <= 0.0 {
                     return None;
@@ -104,7 +112,7 @@ impl ShapeLight {
             }
             Shape::Disk { center, normal, radius } => {
                 let square = square_around(*center, *normal, *radius);
-                if square.is_near(point) {
+                if self.sampling.solid_angle && square.is_near(point) {
                     // Evenly by solid angle in the square around it; by area, what is right above would have no end of variance.
                     let seen = SphericalQuad::new(&square, point)?;
                     let position = meet(&square.corners().map(Vec3::as_dvec3), point, seen.sample(u)?)?;
@@ -130,6 +138,11 @@ impl ShapeLight {
                     let target = Some(point + wi * t * (1.0 - 1e-6));
                     return Some(LightSample::new(wi, target, self.radiance[0], Some(0.25 / PI)));
                 }
+                if !self.sampling.solid_angle {
+                    let outward = uniform_sphere(u);
+                    let position = *center + outward * *radius;
+                    return sample_flat(point, position, outward, self.area, false, self.radiance[0]);
+                }
                 let wi = cone(to_center / distance2.sqrt(), sin2, u);
                 // The near side; beyond the silhouette by rounding, the point nearest to the centre.
                 let along = to_center.dot(wi);
@@ -148,18 +161,29 @@ impl ShapeLight {
         match &self.shape {
             Shape::Sphere { center, radius } => {
                 let sin2 = radius * radius / center.distance_squared(ray.origin);
-                if sin2 < 1.0 { cone_pdf(sin2) } else { 0.25 / PI }
+                match (sin2 < 1.0, self.sampling.solid_angle) {
+                    (false, _) => 0.25 / PI,
+                    (true, true) => cone_pdf(sin2),
+                    (true, false) => {
+                        let way = ray.direction * hit.t;
+                        let outward = (ray.origin + way - *center).normalize_or_zero();
+                        let cos = outward.dot(way.normalize_or_zero()).abs();
+                        way.length_squared() / (self.area * cos)
+                    }
+                }
             }
-            Shape::Parallelogram(quad) if quad.is_near(ray.origin) => pdf_near(quad, ray.origin),
+            Shape::Parallelogram(quad) if self.sampling.solid_angle && quad.is_near(ray.origin) => {
+                pdf_near(quad, ray.origin)
+            }
             shape => {
                 if let Shape::Disk { center, normal, radius } = shape {
                     let square = square_around(*center, *normal, *radius);
-                    if square.is_near(ray.origin) {
+                    if self.sampling.solid_angle && square.is_near(ray.origin) {
                         return pdf_near(&square, ray.origin);
                     }
                 }
                 let density = match shape {
-                    Shape::Parallelogram(quad) => {
+                    Shape::Parallelogram(quad) if self.sampling.product => {
                         quad.brightness(ray.origin, normal).density(hit.uv.x, hit.uv.y)
                     }
                     _ => 1.0,

@@ -1,8 +1,10 @@
 //! Films in files, on many machines, to a noise level, and gone on with.
 
 mod films;
+mod lost;
 mod merging;
 mod noise;
+mod references;
 #[path = "../support/stage.rs"]
 mod stage;
 #[path = "../support/mod.rs"]

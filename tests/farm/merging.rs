@@ -38,7 +38,7 @@ fn merged_parts_are_the_single_run_bit_for_bit() {
         ],
     );
     succeeds(&folder, &["merge", "a.film", "b.film", "-o", "ab.film"]);
-    succeeds(&folder, &["merge", "d.film", "c.film", "-o", "cd.film"]);
+    succeeds(&folder, &["merge", "d.film", "c.film", "-o", "cd.film", "--sample-range", "6..24"]);
     succeeds(&folder, &["merge", "cd.film", "ab.film", "-o", "by.film", "--sample-range", "0..24"]);
     for (name, one) in
         [("all.film", "one.film"), ("all.exr", "one.exr"), ("all.png", "one.png"), ("by.film", "one.film")]
@@ -63,6 +63,11 @@ fn what_does_not_belong_together_is_named() {
     merge(&["a.film", "a.film"], &["a.film and a.film", "0..4"]);
     merge(&["a.film", "b.film", "late.film"], &["b.film and late.film", "6..8", "leave one out"]);
     merge(&["a.film", "late.film"], &["4..6", "missing", "--allow-gaps"]);
+    // Also at the beginning.
+    merge(&["b.film"], &["0..4", "missing", "--allow-gaps", "--sample-range 4..8"]);
+    merge(&["b.film", "--sample-range", "0..8"], &["0..4", "missing"]);
+    succeeds(&folder, &["merge", "b.film", "-o", "b.exr", "--sample-range", "4..8"]);
+    succeeds(&folder, &["merge", "b.film", "-o", "b.film", "-o", "b.exr", "--allow-gaps"]);
     merge(&["a.film", "b.film", "--sample-range", "0..16"], &["8..16", "missing"]);
     merge(&["a.film", "b.film", "--sample-range", "0..6"], &["b.film", "4..8", "not within 0..6"]);
     let others: [(&[&str], &str); 8] = [

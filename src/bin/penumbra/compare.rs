@@ -3,14 +3,17 @@
 use crate::exit;
 use crate::print::line;
 use penumbra::cli::CompareArgs;
-use penumbra::image::compare::compare_files;
+use penumbra::reference::compare;
 
 /// Says how much two pictures differ.
 pub fn run(args: &CompareArgs) -> u8 {
-    let difference = match compare_files(&args.a, &args.b) {
-        Ok(difference) => difference,
+    let (difference, shared) = match compare(&args.a, &args.b) {
+        Ok(compared) => compared,
         Err(error) => return exit::because(&error, exit::FAILED),
     };
+    if let Some(shared) = shared {
+        eprintln!("warning: {shared}");
+    }
     if args.json {
         match serde_json::to_string(&difference) {
             Ok(json) => line(json),

@@ -5,7 +5,9 @@ use crate::headless;
 use crate::{exit, signal::set_threads};
 use penumbra::cli::WindowArgs;
 #[cfg(feature = "view")]
-use penumbra::{app::FrameBudget, open::open, render::open_reference, shown::Shown, trace::RenderSettings};
+use penumbra::{
+    app::FrameBudget, farm::Identity, open::open, reference::Reference, shown::Shown, trace::RenderSettings,
+};
 
 /// Where the window comes to rest, if nobody says.
 #[cfg(feature = "view")]
@@ -44,7 +46,7 @@ pub fn run(args: &WindowArgs) -> u8 {
         Err(error) => return exit::because(&error, exit::BAD_COMMAND_LINE),
     };
     let replays = replay.is_some();
-    let reference = match args.output.reference.as_deref().map(open_reference).transpose() {
+    let reference = match args.output.reference.as_deref().map(Reference::open).transpose() {
         Ok(reference) => reference,
         Err(error) => return exit::because(&error, exit::FAILED),
     };
@@ -55,7 +57,7 @@ pub fn run(args: &WindowArgs) -> u8 {
         in_points: wishes.size.is_none(),
         folder: source.folder(),
         screenshot_stem: source.name(),
-        reference,
+        reference: reference.as_ref().map(|reference| reference.picture.clone()),
         keys,
         notice,
         replay,
@@ -71,6 +73,12 @@ pub fn run(args: &WindowArgs) -> u8 {
                 let mut shown = opened.app.world.resource_mut::<Shown>();
                 (shown.only_film, shown.never_smooth) = (only_film, never_smooth);
                 headless::tell(&opened.report);
+                if let Some(reference) = reference.as_ref().filter(|reference| reference.seed().is_some()) {
+                    let identity = Identity::of(&opened.app.world, source.name());
+                    if let Err(error) = reference.is_independent(&identity, 0..u32::MAX) {
+                        eprintln!("warning: {error}");
+                    }
+                }
                 let mut budget = opened.app.world.resource_mut::<FrameBudget>();
                 budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
                 budget.adaptive = opened.samples.is_none() && !even;

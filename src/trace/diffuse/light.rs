@@ -43,7 +43,7 @@ impl Batch {
                         self.take_sampled(block, &samplers, light, depth, &arrivals);
                     }
                 }
-                FlatLight::Mesh(mesh) if mesh.is_many() => {
+                FlatLight::Mesh(mesh) if mesh.has_tree() => {
                     self.light_mesh(scene, block, mesh, [light, dimension, depth]);
                 }
                 _ => {
