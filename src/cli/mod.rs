@@ -13,6 +13,7 @@ pub use scene::{PartArgs, SceneArgs};
 
 use crate::load::LoadOptions;
 use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
 use std::ops::Range;
 use std::path::PathBuf;
 use values::{exposure, sample_range};
@@ -91,9 +92,9 @@ pub struct WindowArgs {
 approximated; 3 refused."
 )]
 pub struct CheckArgs {
-    /// .gltf, .glb, .obj or .toml files, or built-in scenes
+    /// .gltf, .glb, .obj or .toml files, folders with such, or built-in scenes
     #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<String>,
+    pub files: Vec<OsString>,
     /// Settings file to use instead of the .toml beside each scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,

@@ -8,14 +8,15 @@ use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
 use clap::Args;
 use glam::{DVec3, UVec2};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// The scene and how it should look.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb, .obj or .toml file, or a built-in scene (see --list-scenes)
+    /// A .gltf, .glb, .obj or .toml file, a folder with one, or a built-in scene (see --list-scenes)
     #[arg(default_value = "cornell")]
-    pub scene: String,
+    pub scene: OsString,
     /// Settings file to use instead of the .toml beside the scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
@@ -131,7 +132,7 @@ impl SceneArgs {
     /// # Errors
     /// If it is neither a file nor built in.
     pub fn source(&self) -> Result<SceneSource, LoadError> {
-        if let Some(made) = crate::torture::shown(&self.scene) {
+        if let Some(made) = self.scene.to_str().and_then(crate::torture::shown) {
             return Ok(SceneSource::Made(made));
         }
         SceneSource::parse(&self.scene)

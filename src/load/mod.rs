@@ -15,6 +15,7 @@ mod card;
 mod error;
 mod files;
 mod first_bytes;
+mod folder;
 mod framing;
 mod geometry;
 mod gltf;
@@ -33,6 +34,7 @@ pub use card::{Card, Verdict};
 pub(crate) use error::choices;
 pub use error::{LoadError, ReadError};
 pub use files::{SceneFiles, Stamp, stamp};
+pub use folder::scenes_in;
 pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use made::Made;
 pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
@@ -46,6 +48,7 @@ use glam::Vec3;
 use report::Sink;
 use settings::{Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -61,22 +64,26 @@ pub enum SceneSource {
 }
 
 impl SceneSource {
-    /// A file if there is one or the argument looks like a path, else a built-in scene.
+    /// A file if there is one or the argument looks like a path, else a built-in scene, else the only scene of a folder.
     ///
     /// # Errors
-    /// [`LoadError::UnknownScene`] if it is neither.
-    pub fn parse(argument: &str) -> Result<Self, LoadError> {
-        let path = Path::new(argument);
+    /// [`LoadError::UnknownScene`] if it is none of these, [`LoadError::Folder`] if the folder has no scene, or several.
+    pub fn parse(argument: impl AsRef<OsStr>) -> Result<Self, LoadError> {
+        let path = Path::new(&argument);
         if path.is_file() {
             return Ok(Self::File(path.to_path_buf()));
         }
-        if let Some(found) = builtin::find(argument) {
+        let argument = path.to_string_lossy();
+        if let Some(found) = builtin::find(&argument) {
             return Ok(Self::BuiltIn(found.name));
+        }
+        if path.is_dir() {
+            return folder::only_scene(path);
         }
         if path.extension().is_some() || argument.contains(['/', '\\']) {
             return Ok(Self::File(path.to_path_buf()));
         }
-        Err(builtin::unknown(argument))
+        Err(builtin::unknown(&argument))
     }
 
     /// Where its file lies, with a separator at its end; empty for what has no file or lies where the program runs.
@@ -87,16 +94,20 @@ impl SceneSource {
         if folder.is_empty() { String::new() } else { format!("{folder}{}", std::path::MAIN_SEPARATOR) }
     }
 
-    /// File stem, or name of the built-in scene: for titles and file names.
+    /// File stem, or name of the built-in scene: for titles.
     #[must_use]
     pub fn name(&self) -> String {
+        self.stem().to_string_lossy().into_owned()
+    }
+
+    /// The same as it begins the names of files, whatever its bytes are.
+    #[must_use]
+    pub fn stem(&self) -> OsString {
         match self {
-            Self::File(path) => path
-                .file_stem()
-                .map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
-            Self::BuiltIn(name) => (*name).to_owned(),
+            Self::File(path) => path.file_stem().map_or_else(|| "scene".into(), OsStr::to_os_string),
+            Self::BuiltIn(name) => (*name).into(),
             // Names of files have no colons on some machines.
-            Self::Made(made) => made.name.replace(':', "-"),
+            Self::Made(made) => made.name.replace(':', "-").into(),
         }
     }
 }
