@@ -27,6 +27,7 @@ mod report;
 pub mod settings;
 mod sky;
 mod source;
+mod studio;
 mod tangents;
 
 pub use builtin::{BuiltIn, built_in_scenes};
