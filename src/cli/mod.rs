@@ -6,7 +6,7 @@ mod render;
 mod scene;
 mod values;
 
-pub use choices::{FilterArg, IntegratorArg, SamplingArg, ToneMapArg};
+pub use choices::{FilterArg, IntegratorArg, LightUnitsArg, SamplingArg, ToneMapArg};
 pub use measure::{ReportArgs, TortureArgs};
 pub use render::{OutputArgs, RenderArgs};
 pub use scene::{PartArgs, SceneArgs};

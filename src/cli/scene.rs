@@ -1,6 +1,6 @@
 //! Which scene, which part of it, and how it should look.
 
-use super::choices::{FilterArg, IntegratorArg, SamplingArg, ToneMapArg};
+use super::choices::{FilterArg, IntegratorArg, LightUnitsArg, SamplingArg, ToneMapArg};
 use super::render::OutputArgs;
 use super::values::{bytes, exposure, isa, length, radius, resolution, time, vector, view_angle};
 use crate::bvh::Isa;
@@ -106,6 +106,9 @@ pub struct PartArgs {
     /// Animation to play or to take the pose from, by name or by number from 0 [default: the first, and those of other things]
     #[arg(long, value_name = "NAME|INDEX", allow_hyphen_values = true)]
     pub animation: Option<String>,
+    /// Units of the lamps in a glTF file [default: what the file lets one see]
+    #[arg(long, value_enum)]
+    pub light_units: Option<LightUnitsArg>,
     /// Memory that loading may take, such as 2G or 500M [default: three quarters of what is free]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub max_memory: Option<u64>,
@@ -120,6 +123,7 @@ impl PartArgs {
             variant: self.variant.clone(),
             time: self.time,
             animation: self.animation.clone(),
+            light_units: self.light_units.map(Into::into),
             max_memory: self.max_memory,
             ..LoadOptions::default()
         }

@@ -124,6 +124,18 @@ impl fmt::Display for SceneSource {
     }
 }
 
+/// What the numbers of `KHR_lights_punctual` in a glTF file mean. The format says candela and lux; which of these stand
+/// behind them in a balance with emissive surfaces is for programs to say, and Blender's exporter has a setting for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightUnits {
+    /// Candela and lux, 683 of which make one W/sr or W/m²: Blender's "Standard".
+    Candela,
+    /// W/sr and W/m², or candela and lux beside surfaces in cd/m²: Blender's "Unitless".
+    Watts,
+    /// W of all directions together, and W/m² of directional lights: Blender's "Raw".
+    Raw,
+}
+
 /// What the caller wants from [`load`].
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
@@ -147,6 +159,8 @@ pub struct LoadOptions {
     pub animation: Option<String>,
     /// Width and height of the picture that a camera of our own is to fit, instead of those of the settings file.
     pub resolution: Option<[u32; 2]>,
+    /// In which units the lamps of glTF files are, instead of what these let one see.
+    pub light_units: Option<LightUnits>,
     /// Where the files are noted that the scene is made of, also if it cannot be loaded.
     pub files: SceneFiles,
 }
