@@ -12,7 +12,7 @@ const GRADE: f32 = 0.75;
 /// Metals this rough or rougher show no picture of what is around them.
 const BLURRED: f32 = 0.4;
 
-/// The same radiance from all sides or, where mirrors and smooth metals would show nothing else, one that grows with height
+/// The same radiance from all sides or, where mirrors, smooth metals and glass would show nothing else, one that grows with height
 /// and has the same mean.
 pub(super) fn environment(world: &mut World, radiance: f32) -> Light {
     let graded = if has_mirrors(world) { graded() } else { None };
@@ -30,11 +30,13 @@ fn graded() -> Option<Sky> {
     Sky::new(1, (0..ROWS).map(row).collect())
 }
 
-/// Whether what is shown has a surface in which one sees what is around it.
+/// Whether what is shown has a surface in which, or through which, one sees what is around it.
 fn has_mirrors(world: &mut World) -> bool {
     let is_mirror = |material: &Material| {
         let is_smooth_metal = matches!(material.glossy, Glossy::Ggx { metallic, roughness, .. } if metallic > 0.5 && roughness < BLURRED);
-        material.mirror != Vec3::ZERO || is_smooth_metal && !material.unlit
+        let is_clear =
+            material.glass.is_some() || material.layers.as_ref().is_some_and(|l| l.transmission.is_some());
+        material.mirror != Vec3::ZERO || !material.unlit && (is_smooth_metal || is_clear)
     };
     let instances = world.query::<&Instance>();
     let mut materials = instances.iter_manual(world).flat_map(|instance| &instance.materials);
@@ -44,6 +46,7 @@ fn has_mirrors(world: &mut World) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Glass;
 
     #[test]
     fn the_graded_sky_is_as_bright_as_the_even_one_and_brighter_above() {
@@ -67,6 +70,7 @@ mod tests {
         let metal = |roughness| Glossy::Ggx { metallic: 1.0, roughness, texture: None };
         assert!(with(Material { mirror: Vec3::splat(0.1), ..Material::default() }));
         assert!(with(Material { glossy: metal(0.1), ..Material::default() }));
+        assert!(with(Material { glass: Some(Glass { ior: 1.5, tint: Vec3::ONE }), ..Material::default() }));
         assert!(!with(Material { glossy: metal(0.9), ..Material::default() }));
         assert!(!with(Material { glossy: metal(0.1), unlit: true, ..Material::default() }));
         assert!(!with(Material::default()));

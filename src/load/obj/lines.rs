@@ -7,7 +7,7 @@ use std::borrow::Cow;
 /// How ZBrush begins a comment that holds the colours of vertices, in hexadecimal digits: mask, red, green, blue.
 pub(super) const POLYPAINT: &str = "#MRGB";
 
-/// The text of a file, without byte order mark, and without the zeros or the mark of CP/M at its end. What is neither UTF-8 nor
+/// The text of a file, without byte order mark, and without the mark of CP/M or the zeros behind its last line. What is neither UTF-8 nor
 /// marked as UTF-16 is taken for Latin-1, as older exporters write it.
 pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, LoadError> {
     let wide = |of: fn([u8; 2]) -> u16| -> Result<Cow<'a, str>, LoadError> {
@@ -23,7 +23,10 @@ pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, L
         return wide(u16::from_be_bytes);
     }
     let length = bytes.iter().rposition(|&byte| byte != 0 && byte != 0x1a).map_or(0, |last| last + 1);
-    let bytes = &bytes[..length];
+    let (text, filling) = bytes.split_at(length);
+    // In the middle of a line something is lost.
+    let is_whole = text.ends_with(b"\n") || text.ends_with(b"\r") || filling.starts_with(b"\x1a");
+    let bytes = if is_whole { text } else { bytes };
     if bytes.contains(&0) {
         return Err(LoadError::broken(file, "content", "binary data, not text in UTF-8"));
     }
