@@ -330,6 +330,55 @@ fn a_check_says_how_files_fare_and_ends_with_the_worst() {
 }
 
 #[test]
+fn a_folder_is_checked_whole_and_rendered_if_it_has_one_scene() {
+    let folder = fresh("folders");
+    std::fs::create_dir_all(folder.join("all/deep")).unwrap();
+    let scene = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    std::fs::write(folder.join("all/deep/one.obj"), scene).unwrap();
+    let render = ["render", "all", "--spp", "1", "--resolution", "8x6", "-q"];
+    assert_eq!(penumbra(&folder, &render).status.code(), Some(0));
+    assert!(folder.join("one.png").is_file());
+    std::fs::write(folder.join("all/two.obj"), format!("{scene}l 1 2\n")).unwrap();
+    std::fs::write(folder.join("all/three.obj"), scene).unwrap();
+    let output = penumbra(&folder, &render);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("all: is a folder; name one of its scenes"), "{said}");
+    for name in ["all", "all/"] {
+        let output = penumbra(&folder, &["check", "--json", name]);
+        let cards = String::from_utf8(output.stdout).unwrap();
+        assert_eq!((output.status.code(), cards.lines().count()), (Some(6), 3), "{cards}");
+    }
+    std::fs::create_dir_all(folder.join("empty")).unwrap();
+    let output = penumbra(&folder, &["check", "empty"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(String::from_utf8(output.stdout).unwrap().contains("no .gltf, .glb or .obj file is in it"));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn names_that_are_no_text_are_opened_and_go_into_names_of_pictures() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = fresh("no-text");
+    let name = |ending: &[u8]| std::ffi::OsStr::from_bytes(&[b"caf\xe9", ending].concat()).to_os_string();
+    std::fs::write(folder.join(name(b".obj")), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_penumbra"));
+        command.args(arguments).arg(name(b".obj")).current_dir(&folder).stdin(Stdio::null());
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        command.output().unwrap().status.code()
+    };
+    assert_eq!(run(&["check"]), Some(0));
+    let small = ["--spp", "1", "--resolution", "8x6", "-q"];
+    assert_eq!(run(&[&["render"], &small[..]].concat()), Some(0));
+    assert!(folder.join(name(b".png")).is_file());
+    std::fs::remove_file(folder.join(name(b".png"))).unwrap();
+    // The window, where there is no display.
+    assert_eq!(run(&small), Some(0));
+    assert!(folder.join(name(b".png")).is_file());
+}
+
+#[test]
 fn the_manual_has_a_page_for_each_command_with_all_its_flags() {
     let folder = fresh("man");
     let (code, page, _) = run("man", &["man"]);

@@ -1,6 +1,7 @@
 //! Wishes that are one of a few words.
 
 use crate::image::ToneMap;
+use crate::load::LightUnits;
 use crate::scene::Filter;
 use crate::trace::{Integrator, Sampling};
 use clap::ValueEnum;
@@ -47,6 +48,27 @@ pub enum ToneMapArg {
     Agx,
     /// ACES, by its usual fit.
     Aces,
+}
+
+/// See [`LightUnits`].
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum LightUnitsArg {
+    /// Candela and lux, 683 to the watt: Blender's "Standard".
+    Candela,
+    /// W/sr and W/m2, or candela beside surfaces in cd/m2: Blender's "Unitless".
+    Watts,
+    /// W of the whole lamp, W/m2 of directional ones: Blender's "Raw".
+    Raw,
+}
+
+impl From<LightUnitsArg> for LightUnits {
+    fn from(arg: LightUnitsArg) -> Self {
+        match arg {
+            LightUnitsArg::Candela => Self::Candela,
+            LightUnitsArg::Watts => Self::Watts,
+            LightUnitsArg::Raw => Self::Raw,
+        }
+    }
 }
 
 impl From<IntegratorArg> for Integrator {

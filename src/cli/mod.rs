@@ -6,13 +6,14 @@ mod render;
 mod scene;
 mod values;
 
-pub use choices::{FilterArg, IntegratorArg, SamplingArg, ToneMapArg};
+pub use choices::{FilterArg, IntegratorArg, LightUnitsArg, SamplingArg, ToneMapArg};
 pub use measure::{ReportArgs, TortureArgs};
 pub use render::{OutputArgs, RenderArgs};
 pub use scene::{PartArgs, SceneArgs};
 
 use crate::load::LoadOptions;
 use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
 use std::ops::Range;
 use std::path::PathBuf;
 use values::{exposure, sample_range};
@@ -91,9 +92,9 @@ pub struct WindowArgs {
 approximated; 3 refused."
 )]
 pub struct CheckArgs {
-    /// .gltf, .glb, .obj or .toml files, or built-in scenes
+    /// .gltf, .glb, .obj or .toml files, folders with such, or built-in scenes
     #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<String>,
+    pub files: Vec<OsString>,
     /// Settings file to use instead of the .toml beside each scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,

@@ -1,6 +1,6 @@
 //! Which scene, which part of it, and how it should look.
 
-use super::choices::{FilterArg, IntegratorArg, SamplingArg, ToneMapArg};
+use super::choices::{FilterArg, IntegratorArg, LightUnitsArg, SamplingArg, ToneMapArg};
 use super::render::OutputArgs;
 use super::values::{bytes, crop, exposure, isa, length, radius, resolution, time, vector, view_angle};
 use crate::bvh::Isa;
@@ -8,14 +8,15 @@ use crate::load::{LoadError, LoadOptions, SceneSource};
 use crate::open::{Pose, Wishes};
 use clap::Args;
 use glam::{DVec3, UVec2};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// The scene and how it should look.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb, .obj or .toml file, or a built-in scene (see --list-scenes)
+    /// A .gltf, .glb, .obj or .toml file, a folder with one, or a built-in scene (see --list-scenes)
     #[arg(default_value = "cornell")]
-    pub scene: String,
+    pub scene: OsString,
     /// Settings file to use instead of the .toml beside the scene
     #[arg(long, value_name = "FILE")]
     pub scene_settings: Option<PathBuf>,
@@ -108,6 +109,9 @@ pub struct PartArgs {
     /// Animation to play or to take the pose from, by name or by number from 0 [default: the first, and those of other things]
     #[arg(long, value_name = "NAME|INDEX", allow_hyphen_values = true)]
     pub animation: Option<String>,
+    /// Units of the lamps in a glTF file [default: what the file lets one see]
+    #[arg(long, value_enum)]
+    pub light_units: Option<LightUnitsArg>,
     /// Memory that loading may take, such as 2G or 500M [default: three quarters of what is free]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub max_memory: Option<u64>,
@@ -122,6 +126,7 @@ impl PartArgs {
             variant: self.variant.clone(),
             time: self.time,
             animation: self.animation.clone(),
+            light_units: self.light_units.map(Into::into),
             max_memory: self.max_memory,
             ..LoadOptions::default()
         }
@@ -134,7 +139,7 @@ impl SceneArgs {
     /// # Errors
     /// If it is neither a file nor built in.
     pub fn source(&self) -> Result<SceneSource, LoadError> {
-        if let Some(made) = crate::torture::shown(&self.scene) {
+        if let Some(made) = self.scene.to_str().and_then(crate::torture::shown) {
             return Ok(SceneSource::Made(made));
         }
         SceneSource::parse(&self.scene)

@@ -4,6 +4,7 @@ use super::report::{Found, Kind, LoadReport, Phase, Remark};
 use super::{LoadError, LoadOptions, SceneSource, load};
 use bevy_ecs::world::World;
 use serde::Serialize;
+use std::ffi::OsStr;
 use std::fmt::Write;
 
 /// How a file fared.
@@ -46,10 +47,10 @@ pub struct Card {
 impl Card {
     /// Loads what `argument` names (a file or a built-in scene) and keeps only the card.
     #[must_use]
-    pub fn check(argument: &str, options: &LoadOptions) -> Self {
+    pub fn check(argument: impl AsRef<OsStr>, options: &LoadOptions) -> Self {
         let loaded =
-            SceneSource::parse(argument).and_then(|source| load(&mut World::new(), &source, options));
-        Self::new(argument, &loaded)
+            SceneSource::parse(&argument).and_then(|source| load(&mut World::new(), &source, options));
+        Self::new(&argument.as_ref().to_string_lossy(), &loaded)
     }
 
     /// The card of a file that was loaded or refused.

@@ -25,6 +25,14 @@ pub enum LoadError {
         /// All built-in scenes.
         names: String,
     },
+    /// A folder with no scene in it, or with several.
+    #[error("{folder}: is a folder; {names}")]
+    Folder {
+        /// The folder.
+        folder: String,
+        /// What is in it.
+        names: String,
+    },
     /// The ending says nothing, nor do the first bytes.
     #[error("{file}: cannot tell its format; Penumbra reads .gltf, .glb, .obj and .toml")]
     UnknownFormat {

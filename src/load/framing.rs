@@ -1,6 +1,7 @@
 //! What the program decides when a file has no camera or no light, and how large the scene is.
 
 use super::report::{Kind, Sink};
+use super::studio;
 use crate::scene::{
     ActiveCamera, Camera, GlobalTransform, Instance, Light, Material, Mesh, Projection, SceneBounds,
     Transform, Visible, propagate_transforms,
@@ -288,7 +289,7 @@ fn add_light(world: &mut World, camera: Entity, ball: SceneBounds) -> [Entity; 2
         radiance: [Vec3::splat(radiance as f32); 4],
         two_sided: false,
     };
-    let environment = Light::Environment { radiance: Vec3::splat(FILL_RADIANCE) };
+    let environment = studio::environment(world, FILL_RADIANCE);
     [
         world.spawn((Name::new("key light"), transform, key, Visible(false))).id(),
         world.spawn((Name::new("environment"), Transform::default(), environment)).id(),

@@ -15,6 +15,7 @@ mod card;
 mod error;
 mod files;
 mod first_bytes;
+mod folder;
 mod framing;
 mod geometry;
 mod gltf;
@@ -26,6 +27,7 @@ mod report;
 pub mod settings;
 mod sky;
 mod source;
+mod studio;
 mod tangents;
 
 pub use builtin::{BuiltIn, built_in_scenes};
@@ -33,6 +35,7 @@ pub use card::{Card, Verdict};
 pub(crate) use error::choices;
 pub use error::{LoadError, ReadError};
 pub use files::{SceneFiles, Stamp, stamp};
+pub use folder::scenes_in;
 pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use made::Made;
 pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
@@ -46,6 +49,7 @@ use glam::Vec3;
 use report::Sink;
 use settings::{Edits, Materials, Model, Settings};
 use source::{Bytes, Folder, SCENE_LIMIT, TEXT_LIMIT};
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -61,22 +65,26 @@ pub enum SceneSource {
 }
 
 impl SceneSource {
-    /// A file if there is one or the argument looks like a path, else a built-in scene.
+    /// A file if there is one or the argument looks like a path, else a built-in scene, else the only scene of a folder.
     ///
     /// # Errors
-    /// [`LoadError::UnknownScene`] if it is neither.
-    pub fn parse(argument: &str) -> Result<Self, LoadError> {
-        let path = Path::new(argument);
+    /// [`LoadError::UnknownScene`] if it is none of these, [`LoadError::Folder`] if the folder has no scene, or several.
+    pub fn parse(argument: impl AsRef<OsStr>) -> Result<Self, LoadError> {
+        let path = Path::new(&argument);
         if path.is_file() {
             return Ok(Self::File(path.to_path_buf()));
         }
-        if let Some(found) = builtin::find(argument) {
+        let argument = path.to_string_lossy();
+        if let Some(found) = builtin::find(&argument) {
             return Ok(Self::BuiltIn(found.name));
+        }
+        if path.is_dir() {
+            return folder::only_scene(path);
         }
         if path.extension().is_some() || argument.contains(['/', '\\']) {
             return Ok(Self::File(path.to_path_buf()));
         }
-        Err(builtin::unknown(argument))
+        Err(builtin::unknown(&argument))
     }
 
     /// Where its file lies, with a separator at its end; empty for what has no file or lies where the program runs.
@@ -87,16 +95,20 @@ impl SceneSource {
         if folder.is_empty() { String::new() } else { format!("{folder}{}", std::path::MAIN_SEPARATOR) }
     }
 
-    /// File stem, or name of the built-in scene: for titles and file names.
+    /// File stem, or name of the built-in scene: for titles.
     #[must_use]
     pub fn name(&self) -> String {
+        self.stem().to_string_lossy().into_owned()
+    }
+
+    /// The same as it begins the names of files, whatever its bytes are.
+    #[must_use]
+    pub fn stem(&self) -> OsString {
         match self {
-            Self::File(path) => path
-                .file_stem()
-                .map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
-            Self::BuiltIn(name) => (*name).to_owned(),
+            Self::File(path) => path.file_stem().map_or_else(|| "scene".into(), OsStr::to_os_string),
+            Self::BuiltIn(name) => (*name).into(),
             // Names of files have no colons on some machines.
-            Self::Made(made) => made.name.replace(':', "-"),
+            Self::Made(made) => made.name.replace(':', "-").into(),
         }
     }
 }
@@ -110,6 +122,18 @@ impl fmt::Display for SceneSource {
             Self::Made(made) => f.write_str(made.name),
         }
     }
+}
+
+/// What the numbers of `KHR_lights_punctual` in a glTF file mean. The format says candela and lux; which of these stand
+/// behind them in a balance with emissive surfaces is for programs to say, and Blender's exporter has a setting for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightUnits {
+    /// Candela and lux, 683 of which make one W/sr or W/m²: Blender's "Standard".
+    Candela,
+    /// W/sr and W/m², or candela and lux beside surfaces in cd/m²: Blender's "Unitless".
+    Watts,
+    /// W of all directions together, and W/m² of directional lights: Blender's "Raw".
+    Raw,
 }
 
 /// What the caller wants from [`load`].
@@ -135,6 +159,8 @@ pub struct LoadOptions {
     pub animation: Option<String>,
     /// Width and height of the picture that a camera of our own is to fit, instead of those of the settings file.
     pub resolution: Option<[u32; 2]>,
+    /// In which units the lamps of glTF files are, instead of what these let one see.
+    pub light_units: Option<LightUnits>,
     /// Where the files are noted that the scene is made of, also if it cannot be loaded.
     pub files: SceneFiles,
 }

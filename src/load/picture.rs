@@ -5,7 +5,7 @@ use super::ktx2;
 use super::report::{Kind, Phase, Sink};
 use crate::scene::Texels;
 use image::error::ImageError;
-use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -29,10 +29,22 @@ pub(super) struct Picture<'a> {
     pub(super) strict: bool,
     /// What is where it cannot be had: the [`stand_in`], or nothing, as the caller decides.
     pub(super) instead: &'static str,
+    /// Its brightness is wanted in 16 bits, if it has so many: slopes of heights in 8 bits are stairs.
+    pub(super) deep: bool,
+}
+
+/// A decoded picture.
+pub(super) struct Decoded {
+    pub(super) texels: Arc<Texels>,
+    /// [`Picture::deep`]: the mean of red, green and blue, from 0 to 65535; none if 8 bits say it all.
+    pub(super) brightness: Option<Vec<u16>>,
 }
 
 /// [`Picture::instead`] for what shows the [`stand_in`].
 pub(super) const CHECKER: &str = "a magenta checker stands in";
+
+/// Said of a picture whose 16 bits a channel are cut.
+pub(super) const IN_EIGHT_BITS: &str = "image of 16 bits a channel: kept in 8";
 
 /// What happened to a picture.
 struct Note(Kind, String);
@@ -40,22 +52,19 @@ struct Note(Kind, String);
 /// Decodes all pictures side by side; `file` is the scene that names them.
 ///
 /// None where a picture cannot be had, which is told.
-pub(super) fn decode_all(
-    file: &str,
-    pictures: &[Picture<'_>],
-    sink: &mut Sink<'_>,
-) -> Vec<Option<Arc<Texels>>> {
+pub(super) fn decode_all(file: &str, pictures: &[Picture<'_>], sink: &mut Sink<'_>) -> Vec<Option<Decoded>> {
     // What decoders make of it is there beside it for a while.
     let affordable: Vec<bool> = pictures
         .iter()
         .map(|picture| {
-            let memory = picture.bytes.as_ref().ok().and_then(|bytes| memory(bytes)).unwrap_or(0);
+            let memory =
+                picture.bytes.as_ref().ok().and_then(|bytes| memory(bytes, picture.deep)).unwrap_or(0);
             sink.budget.take(memory, file, &picture.label).is_ok()
         })
         .collect();
     let done = AtomicUsize::new(0);
     let watcher = &sink.options.watcher;
-    let decoded: Vec<(Option<Arc<Texels>>, Vec<Note>)> = pictures
+    let decoded: Vec<(Option<Decoded>, Vec<Note>)> = pictures
         .par_iter()
         .zip(affordable)
         .map(|(picture, affordable)| {
@@ -67,22 +76,22 @@ pub(super) fn decode_all(
                 Ok(_) if !affordable => {
                     Err("image left out: too large for the memory allowed (see --max-memory)".to_owned())
                 }
-                Ok(bytes) => decode(bytes, picture.strict, &mut remarks),
+                Ok(bytes) => decode(bytes, picture, &mut remarks),
             };
-            let texels = result.map_err(|why| {
+            let decoded = result.map_err(|why| {
                 remarks.push(Note(Kind::Ignored, format!("{why}; {}", picture.instead)));
             });
-            (texels.ok().map(Arc::new), remarks)
+            (decoded.ok(), remarks)
         })
         .collect();
     decoded
         .into_iter()
         .zip(pictures)
-        .map(|((texels, remarks), picture)| {
+        .map(|((decoded, remarks), picture)| {
             for Note(kind, what) in remarks {
                 sink.remark(kind, file, &picture.label, what, 1);
             }
-            texels
+            decoded
         })
         .collect()
 }
@@ -94,14 +103,15 @@ pub(super) fn stand_in() -> Arc<Texels> {
     Arc::new(Texels { width: 8, height: 8, texels })
 }
 
-/// Bytes that decoding takes: the texels, and the picture as its decoder has it.
-fn memory(bytes: &[u8]) -> Option<u64> {
+/// Bytes that decoding takes: the texels, and the picture as its decoder has it; if `deep`, its brightness too.
+fn memory(bytes: &[u8], deep: bool) -> Option<u64> {
     if ktx2::size(bytes).is_some() {
         return ktx2::memory(bytes);
     }
     let decoder = reader_of(bytes).ok()?.into_decoder().ok()?;
     let (width, height) = decoder.dimensions();
-    Some((4 * u64::from(width) * u64::from(height)).saturating_add(decoder.total_bytes()))
+    let each = if deep && is_deep(decoder.color_type()) { 12 } else { 4 };
+    Some((each * u64::from(width) * u64::from(height)).saturating_add(decoder.total_bytes()))
 }
 
 /// By the first bytes and not by the name; TGA has none of its own, but a header in which little is possible.
@@ -130,10 +140,16 @@ fn is_targa(bytes: &[u8]) -> bool {
     has_size && depths.contains(&depth) && (has_map || !indexed && map == 0)
 }
 
+/// Whether a channel has 16 bits; what has more is no picture of 8 bits by another name.
+fn is_deep(color: ColorType) -> bool {
+    matches!(color, ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16)
+}
+
 /// Decodes one picture.
-fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels, String> {
+fn decode(bytes: &[u8], picture: &Picture<'_>, remarks: &mut Vec<Note>) -> Result<Decoded, String> {
     if ktx2::size(bytes).is_some() {
-        return ktx2::decode(bytes, MOST_TEXELS);
+        let texels = Arc::new(ktx2::decode(bytes, MOST_TEXELS)?);
+        return Ok(Decoded { texels, brightness: None });
     }
     if let Some(format) = foreign_format(bytes) {
         return Err(format!("image format {format} is not supported"));
@@ -142,7 +158,7 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels,
     let Some(format) = reader.format() else {
         return Err("image format not recognised".to_owned());
     };
-    if strict && !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP) {
+    if picture.strict && !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP) {
         let what = format!("image format {format:?} is not allowed in glTF; used all the same");
         remarks.push(Note(Kind::Repaired, what));
     }
@@ -169,18 +185,26 @@ fn decode(bytes: &[u8], strict: bool, remarks: &mut Vec<Note>) -> Result<Texels,
         let what = "image with high dynamic range: cut at 1 and kept in 8 bits";
         remarks.push(Note(Kind::Approximated, what.to_owned()));
     }
+    let is_deep = is_deep(decoder.color_type());
+    if is_deep && !picture.deep {
+        remarks.push(Note(Kind::Approximated, IN_EIGHT_BITS.to_owned()));
+    }
+    let mut brightness = None;
     let rgba = match jpeg_rgba(bytes).filter(|_| format == ImageFormat::Jpeg) {
         Some(rgba) => rgba,
         None => {
-            let rgba =
-                image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?.into_rgba8();
-            rgba.into_raw()
+            let decoded = image::DynamicImage::from_decoder(decoder).map_err(|error| describe(&error))?;
+            if is_deep && picture.deep {
+                let mean = |Rgb(rgb): &Rgb<u16>| (rgb.map(u32::from).iter().sum::<u32>() / 3) as u16;
+                brightness = Some(decoded.to_rgb16().pixels().map(mean).collect());
+            }
+            decoded.into_rgba8().into_raw()
         }
     };
     // No copy: a texel needs no other place than its bytes.
     let texels = bytemuck::try_cast_vec(rgba).unwrap_or_else(|(_, rgba)| rgba.as_chunks::<4>().0.to_vec());
     if texels.len() as u64 == u64::from(width) * u64::from(height) {
-        Ok(Texels { width, height, texels })
+        Ok(Decoded { texels: Arc::new(Texels { width, height, texels }), brightness })
     } else {
         Err("image has the wrong number of texels".to_owned())
     }
@@ -248,7 +272,10 @@ mod tests {
                 .encode(&bytes[..33 * 17 * channels], 33, 17, color)
                 .map_err(|error| error.to_string())?;
             assert!(jpeg_rgba(&jpeg).is_some());
-            let ours = decode(&jpeg, true, &mut Vec::new())?;
+            let bytes = Err(ReadError::Missing);
+            let picture =
+                Picture { label: String::new(), bytes, strict: true, instead: CHECKER, deep: false };
+            let ours = decode(&jpeg, &picture, &mut Vec::new())?.texels;
             let theirs = image::load_from_memory(&jpeg).map(DynamicImage::into_rgba8);
             let theirs = theirs.map_err(|error| error.to_string())?;
             assert_eq!((ours.width, ours.height), theirs.dimensions());

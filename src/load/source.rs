@@ -7,6 +7,7 @@ use std::borrow::Cow;
 use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+use unicode_normalization::UnicodeNormalization;
 
 /// Most bytes of a scene file or buffer.
 pub(super) const SCENE_LIMIT: u64 = 8 << 30;
@@ -14,6 +15,8 @@ pub(super) const SCENE_LIMIT: u64 = 8 << 30;
 pub(super) const IMAGE_LIMIT: u64 = 512 << 20;
 /// Most bytes of a material library or settings file.
 pub(super) const TEXT_LIMIT: u64 = 64 << 20;
+/// Most folders of a foreign path that are looked for below one's own.
+const MOST_FOLDERS: usize = 6;
 
 /// File contents: read from disk, or part of the program.
 pub(super) type Bytes = Cow<'static, [u8]>;
@@ -58,7 +61,7 @@ impl Folder {
     }
 
     /// Reads what a downloaded scene names: inside this folder only. `\` counts as `/`, and a name
-    /// that differs only in case is found too.
+    /// that differs only in case or in the form of its accents (Unicode NFC or NFD) is found too.
     pub(super) fn read(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
         if let Some(scheme) = uri_scheme(reference) {
             return Err(ReadError::Scheme(scheme.to_owned()));
@@ -93,21 +96,36 @@ impl Folder {
         })
     }
 
-    /// As [`Folder::read`]; a path that is absolute, elsewhere or missing is tried once more by its
-    /// bare file name, because exporters write the paths of the machine they ran on: here, then in a folder `textures`
-    /// in or beside this one, as downloads often have it.
+    /// As [`Folder::read`]; a path that is absolute, elsewhere or missing is tried again without its first folders, down to
+    /// its bare file name, because exporters write the paths of the machine they ran on: here, then in a folder `textures`
+    /// in or beside this one, as downloads often have it. All of that once more with `%20` read as a blank.
     pub(super) fn read_or_neighbour(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
+        let first = match self.read_near(reference, limit) {
+            Err(why @ (ReadError::Missing | ReadError::Outside | ReadError::Scheme(_))) => why,
+            done => return done,
+        };
+        let decoded = percent_decoded(reference);
+        match str::from_utf8(&decoded) {
+            Ok(plain) if plain != reference => self.read_near(plain, limit).map_err(|_| first),
+            _ => Err(first),
+        }
+    }
+
+    fn read_near(&self, reference: &str, limit: u64) -> Result<Bytes, ReadError> {
         let first = match self.read(reference, limit) {
             Err(why @ (ReadError::Missing | ReadError::Outside | ReadError::Scheme(_))) => why,
             done => return done,
         };
-        let bare = reference.rsplit(['/', '\\']).next().unwrap_or(reference);
-        let here = if bare == reference { Err(first) } else { self.read(bare, limit).map_err(|_| first) };
-        let Self::Disk(folder, files) = self else { return here };
-        here.or_else(|first| {
-            let there = |beside| Self::Disk(folder.join(beside), files.clone()).read(bare, limit).ok();
-            ["textures", "../textures"].into_iter().find_map(there).ok_or(first)
-        })
+        let folders: Vec<usize> = reference.match_indices(['/', '\\']).map(|(at, _)| at + 1).collect();
+        let shorter = &folders[folders.len().saturating_sub(MOST_FOLDERS)..];
+        if let Some(found) = shorter.iter().find_map(|&at| self.read(&reference[at..], limit).ok()) {
+            return Ok(found);
+        }
+        let Self::Disk(folder, files) = self else { return Err(first) };
+        let bare = &reference[folders.last().copied().unwrap_or(0)..];
+        let there =
+            |folder: PathBuf| Self::Disk(folder, files.clone()).read(&format!("textures/{bare}"), limit).ok();
+        [folder.clone(), folder.join("..")].into_iter().find_map(there).ok_or(first)
     }
 }
 
@@ -162,7 +180,13 @@ fn inside(reference: &str) -> Option<PathBuf> {
     (clean != Path::new("")).then_some(clean)
 }
 
-/// Finds `relative` below `folder` whatever the case of its letters.
+/// A name as it is compared: letters of any case, and with accents either as letters of their own or as marks on others, as
+/// macOS and archives made there have them.
+fn folded(name: &str) -> String {
+    name.nfc().flat_map(char::to_lowercase).nfc().collect()
+}
+
+/// Finds `relative` below `folder` whatever the case of its letters and the form of its accents.
 fn any_case(folder: &Path, relative: &Path) -> Result<PathBuf, ReadError> {
     let mut found = folder.to_path_buf();
     for component in relative.components() {
@@ -171,15 +195,36 @@ fn any_case(folder: &Path, relative: &Path) -> Result<PathBuf, ReadError> {
             found = exact;
             continue;
         }
-        let wanted = component.as_os_str().to_string_lossy().to_lowercase();
+        let wanted = folded(&component.as_os_str().to_string_lossy());
         found = fs::read_dir(&found)
             .map_err(from_io)?
             .filter_map(Result::ok)
-            .find(|entry| entry.file_name().to_string_lossy().to_lowercase() == wanted)
+            .find(|entry| folded(&entry.file_name().to_string_lossy()) == wanted)
             .ok_or(ReadError::Missing)?
             .path();
     }
     Ok(found)
+}
+
+/// The bytes that a percent-encoded text stands for; a `%` without two digits is itself.
+pub(super) fn percent_decoded(text: &str) -> Vec<u8> {
+    let bytes = text.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let escape = (byte == b'%').then(|| text.get(at + 1..at + 3)).flatten();
+        match escape.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
+            Some(value) => {
+                decoded.push(value);
+                at += 3;
+            }
+            None => {
+                decoded.push(byte);
+                at += 1;
+            }
+        }
+    }
+    decoded
 }
 
 /// Text without a byte order mark.
@@ -201,9 +246,21 @@ mod tests {
     }
 
     #[test]
+    fn accents_and_case_make_no_other_name() {
+        assert_eq!(folded("Cafe\u{301}.PNG"), folded("caf\u{e9}.png"));
+        assert_eq!(folded("STRASSE \u{c4}"), folded("strasse a\u{308}"));
+        assert_ne!(folded("cafe.png"), folded("caf\u{e9}.png"));
+    }
+
+    #[test]
     fn a_drive_letter_is_not_a_scheme() {
         assert_eq!(uri_scheme("http://x/y"), Some("http"));
         assert_eq!(uri_scheme("C:\\x"), None);
         assert_eq!(uri_scheme("a b.png"), None);
+    }
+
+    #[test]
+    fn percent_signs_are_decoded_only_where_hex_digits_follow() {
+        assert_eq!(percent_decoded("a%20b%zz%C3%A9%"), "a b%zzé%".as_bytes());
     }
 }

@@ -3,6 +3,7 @@
 mod wild;
 
 use super::*;
+use penumbra::load::LightUnits;
 
 #[test]
 fn a_primitive_without_normals_or_indices_is_flat_and_light_grey() {
@@ -158,6 +159,58 @@ fn punctual_lights_are_photometric_and_keep_their_angles() {
         [Light::Spot { intensity: Vec3::new(1.0, 0.5, 0.0), inner_angle: 0.25, outer_angle: 0.5 }]
     );
     assert_says(&report.decisions().join("\n"), "candela");
+}
+
+/// What the numbers of lamps mean: by who wrote the file, by what shines beside them, or as the user says.
+#[test]
+fn units_of_lights_are_seen_from_the_file_or_said() {
+    let file = |generator: &str, intensity: f32, emissive: bool| {
+        let more = format!(
+            r#","extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":{intensity}}}]}}}},"materials":[{{"emissiveFactor":[{},0,0]}}]"#,
+            u8::from(emissive)
+        );
+        gltf_triangle(r#","extensions":{"KHR_lights_punctual":{"light":0}}"#, "", &more)
+            .replace(r#""version":"2.0""#, &format!(r#""version":"2.0","generator":"{generator}""#))
+    };
+    let shown = |text: &str, options: &LoadOptions| {
+        let (mut world, result) = Folder::new(&[("a.gltf", text.as_bytes())]).load_with("a.gltf", options);
+        let said = result.unwrap().decisions().join("\n");
+        let Some(Light::Point { intensity }) = lights(&mut world).first().cloned() else { panic!("no lamp") };
+        (intensity.x, said)
+    };
+    let blender = "Khronos glTF Blender I/O v4.2.57";
+    let watts = 1000.0 / (4.0 * std::f32::consts::PI);
+    let usual = LoadOptions::default();
+    for (generator, intensity, emissive, expected, words) in [
+        (blender, 683.0 * watts, true, watts, "candela and lux as the format says"),
+        (blender, watts, true, watts, "\"Unitless\""),
+        (blender, 1000.0, false, watts, "\"Raw\""),
+        ("THREE.GLTFExporter", 683.0, false, 1.0, "candela and lux as the format says"),
+        ("THREE.GLTFExporter", 3.0, true, 3.0, "cd/m²"),
+    ] {
+        let (found, said) = shown(&file(generator, intensity, emissive), &usual);
+        assert!((found / expected - 1.0).abs() < 1e-5, "{generator} {intensity}: {found}");
+        assert!(said.contains(words) && said.contains("--light-units"), "{generator} {intensity}: {said}");
+    }
+    let told = |units| LoadOptions { light_units: Some(units), ..LoadOptions::default() };
+    let text = file(blender, 683.0 * watts, false);
+    assert!((shown(&text, &told(LightUnits::Watts)).0 / (683.0 * watts) - 1.0).abs() < 1e-5);
+    assert!((shown(&text, &told(LightUnits::Candela)).0 / watts - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn what_is_made_from_the_shape_itself_is_told() {
+    let volume = r#""KHR_materials_volume":{"thicknessFactor":1,"thicknessTexture":{"index":0}}"#;
+    let more = format!(
+        r#","materials":[{{"occlusionTexture":{{"index":0}},"extensions":{{{volume}}}}}],"textures":[{{"source":0}}],"images":[{{"uri":"gone.png"}}]"#
+    );
+    let (_, report) = loaded("a.gltf", &gltf_triangle("", r#","material":0"#, &more));
+    let said = report.decisions().join("\n");
+    assert_says(&said, "occlusion textures are not needed");
+    assert_says(&said, "thickness textures are not needed");
+    let targets = r#","targets":[{"POSITION":0,"TANGENT":0}]"#;
+    let (_, report) = loaded("a.gltf", &gltf_triangle("", targets, ""));
+    assert_says(&report.decisions().join("\n"), "morph targets that move TANGENT");
 }
 
 #[test]

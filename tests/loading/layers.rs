@@ -28,6 +28,15 @@ fn what_changes_nothing_makes_no_layer() {
 }
 
 #[test]
+fn an_index_that_no_body_has_is_the_usual_one_and_told() {
+    let (_, report) = material("", r#""KHR_materials_ior":{"ior":0.8}"#);
+    assert_says(&report.warnings().join("\n"), "material `m`: index of refraction 0.8: 1.5 instead");
+    // All light is thrown back: the extension says so.
+    let (_, report) = material("", r#""KHR_materials_ior":{"ior":0}"#);
+    assert_eq!(report.warnings(), [""; 0]);
+}
+
+#[test]
 fn transmission_is_a_pane_and_with_thickness_a_body() {
     let through =
         r#""KHR_materials_transmission":{"transmissionFactor":0.7},"KHR_materials_ior":{"ior":1.33}"#;

@@ -208,8 +208,8 @@ fn what_a_library_says_in_vain_is_told_with_its_line() {
 }
 
 #[test]
-fn the_same_name_twice_counts_once_and_is_told() {
+fn of_the_same_name_twice_the_last_counts_and_it_is_told() {
     let (m, report) = material("Kd 1 0 0\nnewmtl m\nKd 0 1 0");
-    assert_eq!(m.base_color, Vec3::X);
+    assert_eq!(m.base_color, Vec3::Y);
     assert_says(&report.warnings().join("\n"), "defined twice");
 }

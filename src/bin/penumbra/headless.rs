@@ -49,8 +49,9 @@ pub fn files_to_write(given: &[PathBuf]) -> Result<Vec<PathBuf>, ImageError> {
 
 /// `SCENE.png` in the current folder.
 pub fn picture_of(scene: &SceneArgs) -> PathBuf {
-    let name = scene.source().map_or_else(|_| "scene".to_owned(), |source| source.name());
-    PathBuf::from(format!("{name}.png"))
+    let mut name = scene.source().map_or_else(|_| "scene".into(), |source| source.stem());
+    name.push(".png");
+    PathBuf::from(name)
 }
 
 /// Renders to `outputs`.

@@ -3,7 +3,7 @@
 use super::Document;
 use crate::load::budget::Budget;
 use crate::load::error::{LoadError, ReadError};
-use crate::load::source::{Bytes, Folder, IMAGE_LIMIT, SCENE_LIMIT};
+use crate::load::source::{Bytes, Folder, IMAGE_LIMIT, SCENE_LIMIT, percent_decoded};
 use gltf::json::{Index, Root, buffer::View};
 use std::borrow::Cow;
 
@@ -164,26 +164,6 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-fn percent_decoded(text: &str) -> Vec<u8> {
-    let bytes = text.as_bytes();
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut at = 0;
-    while let Some(&byte) = bytes.get(at) {
-        let escape = (byte == b'%').then(|| text.get(at + 1..at + 3)).flatten();
-        match escape.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
-            Some(value) => {
-                decoded.push(value);
-                at += 3;
-            }
-            None => {
-                decoded.push(byte);
-                at += 1;
-            }
-        }
-    }
-    decoded
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,10 +175,5 @@ mod tests {
         assert_eq!(decode_base64("aGFsbG8*"), None);
         assert_eq!(decode_base64("a"), None);
         assert_eq!(decode_base64("a="), None);
-    }
-
-    #[test]
-    fn percent_signs_are_decoded_only_where_hex_digits_follow() {
-        assert_eq!(percent_decoded("a%20b%zz%C3%A9%"), "a b%zzé%".as_bytes());
     }
 }

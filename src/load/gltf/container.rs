@@ -17,8 +17,13 @@ pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, Lo
     if let Some(what) = not_a_scene(bytes) {
         return Err(LoadError::broken(file, "content", format!("is {what}")));
     }
+    // Some writers fill up with zeros, which are no blanks.
+    let without_zeros = |json: &'a [u8]| {
+        let end = json.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+        &json[..end]
+    };
     if !bytes.starts_with(b"glTF") {
-        return Ok(Container { json: bytes, binary: None });
+        return Ok(Container { json: without_zeros(bytes), binary: None });
     }
     let damaged = |problem: String| LoadError::broken(file, "GLB header", problem);
     let (Some(version), Some(total)) = (word(bytes, 4), word(bytes, 8)) else {
@@ -44,11 +49,7 @@ pub(super) fn split<'a>(file: &str, bytes: &'a [u8]) -> Result<Container<'a>, Lo
             )));
         };
         match &kind.to_le_bytes() {
-            // Some writers fill up with zeros instead of blanks.
-            b"JSON" if json.is_none() => {
-                let end = data.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
-                json = Some(&data[..end]);
-            }
+            b"JSON" if json.is_none() => json = Some(without_zeros(data)),
             b"BIN\0" if binary.is_none() => binary = Some(data),
             _ => {} // The specification asks to skip what is not known.
         }

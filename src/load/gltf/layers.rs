@@ -73,6 +73,12 @@ impl Extensions {
         }
     }
 
+    /// An index of refraction that no body has, in place of which there is the usual one.
+    pub(super) fn odd_ior(&self) -> Option<f32> {
+        let said = self.ior.as_ref()?.ior.0;
+        (said != 0.0 && index(said) != said).then_some(said)
+    }
+
     /// All textures that they use.
     pub(super) fn uses(&self) -> Vec<Use> {
         let specular = self.specular.as_ref().map(|s| [&s.specular_texture, &s.specular_color_texture]);

@@ -1,6 +1,7 @@
 //! `KHR_lights_punctual` and cameras.
 
 use super::Document;
+use crate::load::LightUnits;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::scene::{Aspect, Camera, Light, Projection};
@@ -11,13 +12,11 @@ use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// Lumen per watt: the constant of `KHR_lights_punctual` and of the candela's definition.
-const LUMEN_PER_WATT: f32 = 683.0;
-
-/// The light of a node and its name.
+/// The light of a node, whose numbers are in these units.
 pub(super) fn light_of(
     document: &Document<'_>,
     node: &Node,
+    units: LightUnits,
     user: &str,
     sink: &mut Sink<'_>,
 ) -> Result<Option<Light>, LoadError> {
@@ -33,7 +32,7 @@ pub(super) fn light_of(
         sink.ignored(file, &place, "unknown type of light");
         return Ok(None);
     };
-    let power = Vec3::from(light.color) * light.intensity / LUMEN_PER_WATT;
+    let power = Vec3::from(light.color) * (light.intensity * units.factor(kind == LightType::Directional));
     if !power.is_finite() || power.min_element() < 0.0 {
         sink.ignored(file, &place, "light with a colour or intensity that is negative or not finite");
         return Ok(None);
@@ -41,7 +40,6 @@ pub(super) fn light_of(
     if light.range.is_some() {
         sink.approximated(file, &place, "range of a light ignored: it reaches as far as light does");
     }
-    sink.decide(file, "punctual lights are in candela and lux as the format says: 683 make one W/sr or W/m²");
     Ok(Some(match kind {
         LightType::Point => Light::Point { intensity: power },
         LightType::Directional => Light::Directional { irradiance: power, angle: 0.0 },

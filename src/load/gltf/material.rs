@@ -15,6 +15,7 @@ use gltf::json;
 use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 use std::cell::Cell;
+use std::collections::HashMap;
 
 /// Material entities of a file.
 pub(super) struct Palette {
@@ -52,16 +53,26 @@ pub(super) fn spawn_all(
     let mut textures = Textures::new(document, sink)?;
     let mut palette =
         Palette { materials: Vec::new(), default: None, uv_sets: Vec::new(), textured: Vec::new() };
+    let mut named: HashMap<&str, usize> = HashMap::new();
+    for name in document.root.materials.iter().filter_map(|material| material.name.as_deref()) {
+        *named.entry(name).or_default() += 1;
+    }
     for (i, material) in document.root.materials.iter().enumerate() {
-        let name = material.name.clone().unwrap_or_else(|| format!("material {i}"));
-        let sets = uv_sets(document, material, &name, sink);
+        let name = material.name.clone().filter(|name| !name.is_empty());
+        let is_shared =
+            name.as_ref().is_some_and(|name| named.get(name.as_str()).is_some_and(|&count| count > 1));
+        let name = name.unwrap_or_else(|| format!("material {i}"));
+        // What several are called says of none which it is.
+        let label = if is_shared { format!("{name}` ({i})") } else { format!("{name}`") };
+        let sets = uv_sets(document, material, &label, sink);
         palette.uv_sets.push(sets);
         palette.textured.push(!uses(material).is_empty());
         head::tell_unsupported(document.file, material, sink);
+        tell_unneeded(document.file, material, sink);
         let entity = match overrides.replacement(&name) {
             Some(entity) => entity,
             None => {
-                let component = convert(document, material, &name, sets, &mut textures, sink);
+                let component = convert(document, material, &label, sets, &mut textures, sink);
                 sink.spawn((Name::new(name), component))
             }
         };
@@ -70,8 +81,19 @@ pub(super) fn spawn_all(
     Ok(palette)
 }
 
+/// Tells of pictures that stand in for what light does here by itself.
+fn tell_unneeded(file: &str, material: &json::Material, sink: &mut Sink<'_>) {
+    if material.occlusion_texture.is_some() {
+        sink.decide(file, "occlusion textures are not needed: light itself finds what is hidden from it");
+    }
+    let volume = material.extensions.as_ref().and_then(|extensions| extensions.volume.as_ref());
+    if volume.is_some_and(|volume| volume.thickness_texture.is_some()) {
+        sink.decide(file, "thickness textures are not needed: light goes as far as bodies are thick");
+    }
+}
+
 /// A mesh has two sets of texture coordinates: the first two that the material's textures ask for.
-fn uv_sets(document: &Document<'_>, material: &json::Material, name: &str, sink: &mut Sink<'_>) -> [u32; 2] {
+fn uv_sets(document: &Document<'_>, material: &json::Material, label: &str, sink: &mut Sink<'_>) -> [u32; 2] {
     let uses = uses(material);
     let first = uses.first().map_or(0, |first| first.uv_set);
     let mut others = uses.iter().map(|other| other.uv_set).filter(|&set| set != first);
@@ -81,7 +103,7 @@ fn uv_sets(document: &Document<'_>, material: &json::Material, name: &str, sink:
         let what = format!(
             "textures use more than two TEXCOORD sets; all but TEXCOORD_{first} get TEXCOORD_{second}"
         );
-        sink.approximated(file, &format!("material `{name}`"), what);
+        sink.approximated(file, &format!("material `{label}"), what);
     }
     [first, second]
 }
@@ -89,7 +111,7 @@ fn uv_sets(document: &Document<'_>, material: &json::Material, name: &str, sink:
 fn convert(
     document: &Document<'_>,
     material: &json::Material,
-    name: &str,
+    label: &str,
     sets: [u32; 2],
     textures: &mut Textures<'_>,
     sink: &mut Sink<'_>,
@@ -113,7 +135,11 @@ fn convert(
     let asked = Extensions::of(material);
     for extension in &asked.odd {
         let what = format!("{extension} is not as specified");
-        sink.ignored(document.file, &format!("material `{name}`"), what);
+        sink.ignored(document.file, &format!("material `{label}"), what);
+    }
+    if let Some(ior) = asked.odd_ior() {
+        let what = format!("index of refraction {ior}: 1.5 instead");
+        sink.repaired(document.file, &format!("material `{label}"), what);
     }
     let mut layers = if unlit { None } else { asked.layers(sets, &unit, textures, sink) };
     let mut roughness_texture = None;
@@ -132,14 +158,14 @@ fn convert(
         let what =
             "transmission without a thickness (KHR_materials_volume): a thin pane, which bends no light"
                 .to_owned();
-        sink.remark(Kind::Decided, document.file, &format!("material `{name}`"), what, 1);
+        sink.remark(Kind::Decided, document.file, &format!("material `{label}"), what, 1);
     }
     if material.alpha_mode == Checked::Invalid {
-        sink.repaired(document.file, &format!("material `{name}`"), "unknown alphaMode, opaque instead");
+        sink.repaired(document.file, &format!("material `{label}"), "unknown alphaMode, opaque instead");
     }
     let emission_is_legal = emission.is_finite() && emission.min_element() >= 0.0;
     if clamped.get() || !emission_is_legal {
-        sink.repaired(document.file, &format!("material `{name}`"), "factor out of range, clamped");
+        sink.repaired(document.file, &format!("material `{label}"), "factor out of range, clamped");
     }
     Material {
         base_color,

@@ -76,7 +76,12 @@ impl Meshes {
                     sink.ignored(document.file, &place, what);
                 }
             }
-            if document.meshes.get(index.value()).is_some_and(|mesh| mesh.moves_more(i)) {
+            let more = document.meshes.get(index.value());
+            if more.is_some_and(|mesh| mesh.turns_tangents(i)) {
+                let what = "morph targets that move TANGENT: the tangents turn with the surface instead";
+                sink.decide(document.file, what);
+            }
+            if more.is_some_and(|mesh| mesh.moves_more(i)) {
                 let what = "morph targets that move COLOR_0 or TEXCOORD_n: these stay as they are";
                 sink.ignored(document.file, &place, what);
             }

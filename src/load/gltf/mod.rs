@@ -7,7 +7,8 @@
 //!
 //! Rules where the format leaves a choice: one [`crate::scene::Mesh`] per glTF mesh with all its
 //! primitives; missing normals mean flat shading; skinned meshes stand in their rest pose, morph
-//! targets at the default weights; 1 candela is 1/683 W/sr and 1 lux 1/683 W/m².
+//! targets at the default weights; 1 candela is 1/683 W/sr and 1 lux 1/683 W/m²,
+//! unless the file shows that its lamps are in other units ([`units`]).
 
 mod accessor;
 mod animation;
@@ -25,6 +26,7 @@ mod node;
 mod parse;
 mod place;
 mod texture;
+mod units;
 mod vertices;
 
 use super::budget::Budget;

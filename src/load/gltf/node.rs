@@ -4,7 +4,7 @@ use super::deform::{self, Follower};
 use super::material::Palette;
 use super::mesh::Meshes;
 use super::place::{MOST_NODES, instantiate, place, placement};
-use super::{Document, animation, light};
+use super::{Document, animation, light, units};
 use crate::load::error::LoadError;
 use crate::load::report::{Kind, Sink};
 use crate::scene::{MorphWeights, Transform};
@@ -35,6 +35,7 @@ pub(super) fn spawn_scene(
     let mut flat: Vec<bool> = local.iter().map(|local| local.matrix3.determinant() == 0.0).collect();
     order.iter().for_each(|&i| flat[i] |= parents[i].is_some_and(|parent| flat[parent]));
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
+    let light_units = units::of(document, sink);
     let mut meshes = Meshes::default();
     if nodes.iter().all(|node| node.mesh.is_none()) && !document.root.meshes.is_empty() {
         sink.decide(document.file, "no node shows a mesh: each is shown once");
@@ -54,7 +55,7 @@ pub(super) fn spawn_scene(
         if hidden[i] {
             continue;
         }
-        if let Some(light) = light::light_of(document, node, &user, sink)? {
+        if let Some(light) = light::light_of(document, node, light_units, &user, sink)? {
             sink.world.entity_mut(entity).insert(light);
         }
         if let Some((name, camera, aspect)) = light::camera_of(document, node, &user, sink)? {

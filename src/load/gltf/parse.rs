@@ -52,13 +52,24 @@ struct TargetMore {
     color: Option<IgnoredAny>,
     #[serde(rename = "TEXCOORD_0")]
     uvs: Option<IgnoredAny>,
+    #[serde(rename = "TANGENT")]
+    tangents: Option<IgnoredAny>,
 }
 
 impl MeshMore {
     /// Whether morph targets of a primitive move more than places and directions.
     pub(super) fn moves_more(&self, primitive: usize) -> bool {
+        self.targets(primitive).any(|target| target.color.is_some() || target.uvs.is_some())
+    }
+
+    /// Whether morph targets of a primitive say where its tangents turn.
+    pub(super) fn turns_tangents(&self, primitive: usize) -> bool {
+        self.targets(primitive).any(|target| target.tangents.is_some())
+    }
+
+    fn targets(&self, primitive: usize) -> impl Iterator<Item = &TargetMore> {
         let targets = self.primitives.get(primitive).and_then(|primitive| primitive.targets.as_ref());
-        targets.into_iter().flatten().any(|target| target.color.is_some() || target.uvs.is_some())
+        targets.into_iter().flatten()
     }
 }
 

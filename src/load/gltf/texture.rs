@@ -93,7 +93,8 @@ impl<'a> Textures<'a> {
         }
         let (indices, pictures): (Vec<usize>, Vec<Picture<'_>>) = wanted.into_iter().unzip();
         let decoded = picture::decode_all(document.file, &pictures, sink).into_iter();
-        let texels: Vec<_> = decoded.map(|texels| texels.unwrap_or_else(picture::stand_in)).collect();
+        let texels: Vec<_> =
+            decoded.map(|done| done.map_or_else(picture::stand_in, |done| done.texels)).collect();
         let images = indices.into_iter().zip(texels).collect();
         Ok(Self { document, images, spawned: BTreeMap::new(), made: BTreeMap::new() })
     }
@@ -190,7 +191,7 @@ fn picture_of<'d>(
             .map_err(|_| ReadError::Data("lies outside its buffer")),
         (None, None) => Err(ReadError::Data("has neither a URI nor a buffer view")),
     };
-    Picture { label, bytes, strict: true, instead: picture::CHECKER }
+    Picture { label, bytes, strict: true, instead: picture::CHECKER, deep: false }
 }
 
 fn sampling(

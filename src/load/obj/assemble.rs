@@ -1,7 +1,8 @@
 //! Faces of an OBJ file → one indexed triangle mesh.
 
+use super::numbers::NONE;
 use super::polygon;
-use super::raw::{Corner, NONE, Raw};
+use super::raw::{Corner, Raw};
 use crate::scene::TriangleMesh;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;

@@ -4,12 +4,29 @@ use super::super::error::LoadError;
 use super::super::source::without_bom;
 use std::borrow::Cow;
 
-/// The text of a file, without byte order mark. What is not UTF-8 is taken for Latin-1,
-/// as older exporters write it.
+/// How ZBrush begins a comment that holds the colours of vertices, in hexadecimal digits: mask, red, green, blue.
+pub(super) const POLYPAINT: &str = "#MRGB";
+
+/// The text of a file, without byte order mark, and without the mark of CP/M or the zeros behind its last line. What is neither UTF-8 nor
+/// marked as UTF-16 is taken for Latin-1, as older exporters write it.
 pub(super) fn text_of<'a>(file: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>, LoadError> {
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(LoadError::broken(file, "encoding", "UTF-16 text; save it as UTF-8"));
+    let wide = |of: fn([u8; 2]) -> u16| -> Result<Cow<'a, str>, LoadError> {
+        let units: Vec<u16> = bytes.as_chunks::<2>().0.iter().skip(1).map(|&pair| of(pair)).collect();
+        let text = String::from_utf16(&units).ok().filter(|text| !text.contains('\0'));
+        text.map(Cow::Owned)
+            .ok_or_else(|| LoadError::broken(file, "encoding", "damaged UTF-16 text; save it as UTF-8"))
+    };
+    if bytes.starts_with(b"\xff\xfe") {
+        return wide(u16::from_le_bytes);
     }
+    if bytes.starts_with(b"\xfe\xff") {
+        return wide(u16::from_be_bytes);
+    }
+    let length = bytes.iter().rposition(|&byte| byte != 0 && byte != 0x1a).map_or(0, |last| last + 1);
+    let (text, filling) = bytes.split_at(length);
+    // In the middle of a line something is lost.
+    let is_whole = text.ends_with(b"\n") || text.ends_with(b"\r") || filling.starts_with(b"\x1a");
+    let bytes = if is_whole { text } else { bytes };
     if bytes.contains(&0) {
         return Err(LoadError::broken(file, "content", "binary data, not text in UTF-8"));
     }
@@ -77,7 +94,7 @@ pub(super) fn unquoted(name: &str) -> &str {
 
 fn one<E>(line: u32, text: &str, visit: &mut impl FnMut(Statement<'_>) -> Result<(), E>) -> Result<(), E> {
     let text = text.trim();
-    if text.is_empty() || text.starts_with('#') {
+    if text.is_empty() || text.starts_with('#') && !text.starts_with(POLYPAINT) {
         return Ok(());
     }
     let (keyword, rest) = text.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((text, ""));

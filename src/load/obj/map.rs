@@ -132,6 +132,17 @@ impl<'a> Map<'a> {
         Arc::new(Texels { texels: picture.texels.iter().map(texel).collect(), ..**picture })
     }
 
+    /// What the options make of the brightness of a picture, from 0 to 1; none if they ask for one channel.
+    pub fn of_brightness(&self, brightness: &[u16]) -> Option<Vec<f32>> {
+        let moved = |&b: &u16| (f32::from(b) / 65535.0 * self.range.y + self.range.x).clamp(0.0, 1.0);
+        self.channel.is_none().then(|| brightness.iter().map(moved).collect())
+    }
+
+    /// Whether it puts its picture where another one puts its own.
+    pub fn lies_as(&self, other: &Self) -> bool {
+        (self.scale, self.offset, self.clamp) == (other.scale, other.offset, other.clamp)
+    }
+
     /// In coordinates with v down: the mesh's are turned already.
     fn uv_transform(&self) -> Affine2 {
         let offset = Vec2::new(self.offset.x, 1.0 - self.scale.y - self.offset.y);

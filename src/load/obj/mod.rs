@@ -2,7 +2,7 @@
 //!
 //! Geometry is read here: the crate `tobj` stops at a byte order mark or a continued line, wraps
 //! indices around, fans concave polygons and gives no line numbers. Material libraries are read by
-//! `tobj`, after [`mtl`] has checked and tidied their statements one by one (it panics on a colour
+//! `tobj`, after [`tidy`] has checked and tidied their statements one by one (it panics on a colour
 //! of two numbers, and one bad statement would lose the whole library).
 //!
 //! Rules where the format leaves a choice: the whole file is one [`Mesh`] and one [`Instance`];
@@ -17,10 +17,13 @@ mod blender;
 mod lines;
 mod map;
 mod mtl;
+mod numbers;
 mod polygon;
 mod raw;
 mod relief;
 mod textures;
+mod tidy;
+mod vtk;
 
 use super::error::LoadError;
 use super::first_bytes::not_a_scene;
@@ -59,6 +62,7 @@ pub(super) fn load(
     drop(bytes);
     sink.budget.take(raw.memory(), file, "its lists and faces")?;
     raw.settle(file, sink);
+    raw.take_paint(file, sink);
     raw.scale_colors(file, sink);
     raw.check(file, sink)?;
     raw.warn(file, sink);
@@ -97,6 +101,8 @@ struct Library<'a> {
     exact: &'a BTreeMap<String, Entity>,
     bare: HashMap<&'a str, Entity>,
     lower: HashMap<String, (&'a str, Entity)>,
+    /// The last one that has no name, for `usemtl` without one.
+    nameless: Option<Entity>,
 }
 
 impl<'a> Library<'a> {
@@ -106,7 +112,11 @@ impl<'a> Library<'a> {
             bare.entry(bare_name(name)).or_insert(entity);
             lower.entry(name.to_lowercase()).or_insert((name.as_str(), entity));
         }
-        Self { exact, bare, lower }
+        let nameless = exact.iter().filter(|(name, _)| name.starts_with(tidy::NAMELESS));
+        // Of numbers, the longer is the larger.
+        let last = nameless.max_by_key(|(name, _)| (name.len(), name.as_str()));
+        let nameless = last.map(|(_, &entity)| entity);
+        Self { exact, bare, lower, nameless }
     }
 }
 
@@ -126,7 +136,10 @@ fn material_entity(
     if let Some(all) = overrides.all {
         return all;
     }
-    let Some(name) = name else {
+    if let (Some(""), Some(nameless)) = (name, library.nameless) {
+        return nameless;
+    }
+    let Some(name) = name.filter(|name| !name.is_empty()) else {
         sink.decide(file, "surfaces without a material are light grey");
         return sink.spawn((Name::new("default"), Material::default()));
     };

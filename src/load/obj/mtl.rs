@@ -1,9 +1,10 @@
-//! MTL libraries → material entities. `tobj` parses what [`tidy`] lets through.
+//! MTL libraries → material entities. `tobj` parses what [`tidy()`] lets through.
 
 use super::blender;
-use super::lines::{self, Statement, before_comment, unquoted};
-use super::map;
+use super::lines::{self, before_comment, unquoted};
 use super::textures::Textures;
+use super::tidy::tidy;
+use super::vtk;
 use crate::load::report::{Kind, Sink};
 use crate::load::settings::Materials;
 use crate::load::source::{Folder, TEXT_LIMIT};
@@ -13,10 +14,9 @@ use crate::scene::{
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Reads all libraries and spawns their materials; the first of a name counts.
+/// Reads all libraries and spawns their materials; the last of a name counts, as in most programs.
 pub(super) fn spawn_all(
     file: &str,
     folder: &Folder,
@@ -63,9 +63,10 @@ pub(super) fn spawn_all(
     }
     let mut textures = Textures::new(file, folder, &parsed, sink);
     let mut entities = BTreeMap::new();
-    for material in &parsed {
-        if entities.contains_key(&material.name) {
-            let what = format!("material `{}` is defined twice; the first counts", material.name);
+    let last: HashMap<&str, usize> = parsed.iter().enumerate().map(|(i, m)| (m.name.as_str(), i)).collect();
+    for (i, material) in parsed.iter().enumerate() {
+        if last.get(material.name.as_str()) != Some(&i) {
+            let what = format!("material `{}` is defined twice; the last counts", material.name);
             sink.repaired(file, "", what);
             continue;
         }
@@ -125,6 +126,10 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
                     "written by Blender: Ns says roughness, Ks the strength of gloss, illum 3 and 6 metal";
                 sink.decide(library, what);
             }
+            if vtk::is_by_vtk(&text) {
+                materials.iter_mut().for_each(vtk::restate);
+                sink.decide(library, vtk::WHAT);
+            }
             materials
         }
         Err(why) => {
@@ -132,81 +137,6 @@ fn parse(file: &str, library: &str, bytes: &[u8], sink: &mut Sink<'_>) -> Vec<to
             Vec::new()
         }
     }
-}
-
-/// Statements of a colour.
-const COLORS: [&str; 5] = ["Ka", "Kd", "Ks", "Ke", "Tf"];
-/// Statements of one number.
-const SCALARS: [&str; 11] = ["Ns", "Ni", "d", "Tr", "Pr", "Pm", "Ps", "Pc", "Pcr", "aniso", "anisor"];
-/// Statements that name a picture.
-const MAPS: [&str; 9] =
-    ["map_Kd", "map_d", "map_Ke", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Bump", "norm"];
-/// The others that are known.
-const OTHERS: [&str; 7] = ["newmtl", "illum", "bump", "map_Ka", "disp", "decal", "refl"];
-
-/// Only statements that `tobj` parses, in its spelling; warns of the others.
-fn tidy(library: &str, text: &str, by_blender: bool, sink: &mut Sink<'_>) -> String {
-    let mut tidied = String::with_capacity(text.len());
-    let mut inside = false;
-    let done: Result<(), std::fmt::Error> = lines::for_each(text, |Statement { line, keyword, rest }| {
-        let mut ignore = |what: &str| {
-            sink.ignored(library, &format!("line {line}"), format!("`{keyword}` {what}"));
-            Ok(())
-        };
-        let mut known = COLORS.iter().chain(&SCALARS).chain(&MAPS).chain(&OTHERS);
-        let keyword = known.find(|known| known.eq_ignore_ascii_case(keyword)).copied().unwrap_or(keyword);
-        if keyword == "newmtl" {
-            let rest = unquoted(rest);
-            inside = !rest.is_empty();
-            return if inside { writeln!(tidied, "newmtl {rest}") } else { ignore("without a name") };
-        }
-        if !inside {
-            return ignore("before the first newmtl, ignored");
-        }
-        let values: Option<Vec<f32>> = before_comment(rest)
-            .split_ascii_whitespace()
-            .map(|word| word.parse().ok().filter(|v: &f32| v.is_finite()))
-            .collect();
-        let keyword = match keyword {
-            "bump" => "map_Bump",
-            "map_refl" if by_blender => "map_Pm",
-            _ => keyword,
-        };
-        match (keyword, values.as_deref()) {
-            (color, Some([r, g, b, ..])) if COLORS.contains(&color) => {
-                writeln!(tidied, "{color} {r} {g} {b}")
-            }
-            (color, Some([grey])) if COLORS.contains(&color) => {
-                writeln!(tidied, "{color} {grey} {grey} {grey}")
-            }
-            (color, _) if COLORS.contains(&color) => ignore("without three numbers, ignored"),
-            ("d", _) if rest.starts_with("-halo") => ignore("-halo is not supported, ignored"),
-            (scalar, Some([value, ..])) if SCALARS.contains(&scalar) => writeln!(tidied, "{scalar} {value}"),
-            (scalar, _) if SCALARS.contains(&scalar) => ignore("without a number, ignored"),
-            ("illum", Some([model, ..])) if (0.0..=10.0).contains(model) => {
-                writeln!(tidied, "illum {}", *model as u8)
-            }
-            ("illum", _) => ignore("with an unknown model, ignored"),
-            (map, _) if MAPS.contains(&map) => {
-                if rest.is_empty() {
-                    ignore("without a file name, ignored")
-                } else {
-                    writeln!(tidied, "{map} {}", map::beside(library, &map::options_first(rest)))
-                }
-            }
-            ("disp" | "decal" | "refl", _) => {
-                let what = format!("`{keyword}` textures are not supported");
-                sink.ignored(library, &format!("line {line}"), what);
-                Ok(())
-            }
-            // The ambient colour of a lighting model without other light.
-            ("map_Ka", _) => Ok(()),
-            _ => ignore("is not supported"),
-        }
-    });
-    // Writing to a String cannot fail.
-    debug_assert!(done.is_ok());
-    tidied
 }
 
 /// Three numbers of a statement that `tobj` keeps as text.
@@ -220,6 +150,8 @@ fn scalar(material: &tobj::Material, keyword: &str) -> Option<f32> {
     material.unknown_param.get(keyword)?.parse().ok()
 }
 
+/// Index of refraction of glass that says none, or none that bends light into it.
+const USUAL_INDEX: f32 = 1.5;
 /// Below this exponent of Blinn-Phong there is no highlight to be seen.
 const LEAST_EXPONENT: f32 = 2.0;
 
@@ -300,7 +232,7 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         texture: None,
         body: Some(Body { absorption: Vec3::ZERO }),
     });
-    let ior = material.optical_density.filter(|&ior| ior > 1.0).unwrap_or(1.5);
+    let ior = material.optical_density.filter(|&ior| ior > 1.0).unwrap_or(USUAL_INDEX);
     if !out_of_range.is_empty() {
         let which = out_of_range.into_iter().collect::<Vec<_>>().join(", ");
         sink.repaired(
@@ -312,10 +244,25 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let model = material.illumination_model.unwrap_or(2);
     let passes = matches!(model, 4 | 6 | 7 | 9);
     // Some exporters write these models for all materials, others for what is half-transparent.
-    let is_bent = material.optical_density.is_some_and(|ior| ior > 1.0) && opacity == 1.0;
+    // Of what is not there at all the light that passes is to be seen.
+    let is_whole = opacity == 1.0 || opacity == 0.0;
+    let is_bent = material.optical_density.is_some_and(|ior| ior > 1.0) && is_whole;
     let is_tinted = tint != Vec3::ONE && tint != Vec3::ZERO;
     let is_black = diffuse == Vec3::ZERO && !has_texture;
     let is_glass = passes && (is_bent || is_tinted || is_black) && !has_texture;
+    if material.ambient_texture.is_some() && !has_texture {
+        sink.ignored(file, &format!("material `{name}`"), "map_Ka without map_Kd: the picture is not seen");
+    }
+    let mut decide = |what: String| sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);
+    if let Some(said) = material.optical_density.filter(|&said| is_glass && said <= 1.0) {
+        decide(format!("glass with Ni {said}, which bends no light into it: {USUAL_INDEX} instead"));
+    }
+    if is_tinted && !passes {
+        decide(format!("Tf is not seen: illum {model} lets no light through"));
+    }
+    if material.dissolve.is_none() && scalar(material, "Tr").is_some_and(|through| through >= 1.0) {
+        decide("Tr 1 would be nothing at all: taken for opaque".to_owned());
+    }
     if is_glass && material.diffuse.is_some() && !is_black && diffuse != Vec3::ONE {
         let what = format!("illum {model} is glass: its Kd is not seen");
         sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);

@@ -1,6 +1,7 @@
 //! An OBJ file as it is written: lists, faces, and the line each face stands on.
 
-use super::lines::{Statement, unquoted};
+use super::lines::{POLYPAINT, Statement, unquoted};
+use super::numbers::{NONE, bytes_of, numbers, resolve, shorten};
 use crate::bvh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
 use crate::load::report::{Kind, Sink};
@@ -8,8 +9,6 @@ use crate::scene::color::linear_from_srgb;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::{BTreeMap, HashMap};
 
-/// Stands for "no index given".
-pub(super) const NONE: u32 = u32::MAX;
 /// What is so far from zero, and this many times as far as it is large, is counted from a place of its own: single precision
 /// would dent it.
 const FAR: f64 = 4096.0;
@@ -57,6 +56,8 @@ pub(super) struct Raw {
     pub(super) origin: DVec3,
     /// Empty, or as long as `places`.
     pub(super) colors: Vec<Vec3>,
+    /// What comments of ZBrush say of the vertices, in their order.
+    painted: Vec<[u8; 3]>,
     pub(super) uvs: Vec<Vec2>,
     pub(super) normals: Vec<Vec3>,
     pub(super) corners: Vec<Corner>,
@@ -98,7 +99,7 @@ impl Raw {
                 self.slot = None;
             }
             "mtllib" => self.libraries.push(statement.rest.to_owned()),
-            "s" => self.group = statement.rest.parse().unwrap_or(0),
+            "s" => self.group = group_of(statement.rest),
             "g" | "o" => {}
             "p" => self.skip(Skipped::Points, statement.line),
             "l" => self.skip(Skipped::Lines, statement.line),
@@ -106,7 +107,16 @@ impl Raw {
             | "hole" | "scrv" | "sp" | "end" | "con" => self.skip(Skipped::FreeForm, statement.line),
             "bevel" | "c_interp" | "d_interp" | "lod" | "mg" | "shadow_obj" | "trace_obj" | "ctech"
             | "stech" | "usemap" | "maplib" => self.skip(Skipped::Attributes, statement.line),
-            other => self.skip(Skipped::Unknown(shorten(other)), statement.line),
+            POLYPAINT => self.painted.extend(bytes_of(statement.rest).map(|[_, r, g, b]| [r, g, b])),
+            other => {
+                // Some old programs shout.
+                let lower =
+                    ["v", "vt", "vn", "f"].into_iter().find(|known| known.eq_ignore_ascii_case(other));
+                match lower {
+                    Some(keyword) => return self.read(file, &Statement { keyword, ..*statement }),
+                    None => self.skip(Skipped::Unknown(shorten(other)), statement.line),
+                }
+            }
         }
         Ok(())
     }
@@ -193,6 +203,26 @@ impl Raw {
         self.positions = places.into_iter().map(|place| (place - self.origin).as_vec3()).collect();
     }
 
+    /// Takes the colours that ZBrush writes in comments, if there is one for each vertex and no other.
+    pub(super) fn take_paint(&mut self, file: &str, sink: &mut Sink<'_>) {
+        let painted = std::mem::take(&mut self.painted);
+        if painted.is_empty() || !self.colors.is_empty() {
+            return;
+        }
+        if painted.len() != self.positions.len() {
+            let what = format!(
+                "colours of ZBrush (#MRGB) left out: {} of them for {} vertices",
+                painted.len(),
+                self.positions.len()
+            );
+            sink.ignored(file, "", what);
+        } else if painted.iter().any(|color| *color != [255; 3]) {
+            let unit = |color: [u8; 3]| Vec3::from(color.map(f32::from)) / 255.0;
+            self.colors = painted.into_iter().map(unit).collect();
+            sink.decide(file, "vertex colours are those of ZBrush's comments (#MRGB)");
+        }
+    }
+
     /// Brings colours to linear ones from 0 to 1: other programs write them as they are shown, some as bytes.
     pub(super) fn scale_colors(&mut self, file: &str, sink: &mut Sink<'_>) {
         let most = self.colors.iter().filter(|c| c.is_finite()).map(|c| c.max_element()).fold(0.0, f32::max);
@@ -210,7 +240,8 @@ impl Raw {
 
     /// Bytes that this and the mesh made of it take, with what building a hierarchy over it does.
     pub(super) fn memory(&self) -> u64 {
-        let lists = 36 * self.places.len() + 12 * self.colors.len() + 8 * self.uvs.len();
+        let lists =
+            36 * self.places.len() + 12 * self.colors.len() + 15 * self.painted.len() + 8 * self.uvs.len();
         let here = lists + 12 * self.normals.len() + 12 * self.corners.len() + 16 * self.faces.len();
         (here + 60 * self.corners.len() + (14 + 80) * self.triangles()) as u64
     }
@@ -308,53 +339,11 @@ impl Raw {
     }
 }
 
-/// Up to `N` numbers; how many there were. Values that are not finite are allowed, here.
-fn numbers<const N: usize>(text: &str) -> Result<([f64; N], usize), String> {
-    let mut values = [0.0; N];
-    let mut count = 0;
-    for word in text.split_ascii_whitespace().take_while(|word| !word.starts_with('#')).take(N) {
-        values[count] = number(word).ok_or_else(|| format!("`{}` is not a number", shorten(word)))?;
-        count += 1;
+/// Number of a smoothing group; 0 is off.
+fn group_of(text: &str) -> u32 {
+    match text.split_ascii_whitespace().next() {
+        Some("on") => 1,
+        Some(word) => word.parse().unwrap_or(0),
+        None => 0,
     }
-    Ok((values, count))
-}
-
-/// A number. What is spelled as not finite (`nan`, `inf`, `1.#IND` of old compilers) is NaN; what is
-/// too large is infinite.
-fn number(word: &str) -> Option<f64> {
-    let old = word.contains(".#IN") || word.contains(".#QNAN") || word.contains(".#SNAN");
-    if old {
-        return Some(f64::NAN);
-    }
-    let lower = || word.trim_start_matches(['+', '-']).to_ascii_lowercase();
-    let Ok(value) = word.parse::<f64>() else {
-        return (lower().starts_with("nan") || lower().starts_with("inf")).then_some(f64::NAN);
-    };
-    let is_spelled = !value.is_finite() && !word.contains(|c: char| c.is_ascii_digit());
-    Some(if is_spelled { f64::NAN } else { value })
-}
-
-/// Index from 0 of what a face names from 1, or from the end if negative.
-fn resolve(word: Option<&str>, count: usize, what: &str) -> Result<u32, String> {
-    let word = word.unwrap_or_default();
-    if word.is_empty() {
-        return Ok(NONE);
-    }
-    let out_of_range = || format!("index out of range: {what} {}, {count} so far", shorten(word));
-    match word.parse::<i64>() {
-        Ok(0) => Err(format!("index 0: {what} indices begin at 1")),
-        Ok(index) if index > 0 => {
-            u32::try_from(index - 1).ok().filter(|&i| i != NONE).ok_or_else(out_of_range)
-        }
-        Ok(index) => {
-            let from_end =
-                usize::try_from(index.unsigned_abs()).ok().and_then(|back| count.checked_sub(back));
-            from_end.and_then(|i| u32::try_from(i).ok()).ok_or_else(out_of_range)
-        }
-        Err(error) => Err(format!("{what} index `{}` is not a number in range: {error}", shorten(word))),
-    }
-}
-
-fn shorten(word: &str) -> String {
-    word.chars().take(40).collect()
 }

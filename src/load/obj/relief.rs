@@ -13,13 +13,18 @@ pub(super) fn is_normal_map(texels: &Texels) -> bool {
     texels.texels.iter().filter(|texel| bluish(texel)).count() * 10 > texels.texels.len() * 9
 }
 
-/// The normals of a surface that is as high as `heights` are bright, times `-bm`.
-pub(super) fn normals_of_heights(heights: &Texels, bump: f32, clamp: bool) -> Texels {
-    let (width, height) = (heights.width as i64, heights.height as i64);
+/// How high a picture is: as bright as it is, from 0 to 1.
+pub(super) fn heights_of(texels: &Texels) -> Vec<f32> {
+    let bright = |&[r, g, b, _]: &[u8; 4]| f32::from(u16::from(r) + u16::from(g) + u16::from(b)) / 765.0;
+    texels.texels.iter().map(bright).collect()
+}
+
+/// The normals of a surface of these heights, row by row, times `-bm`.
+pub(super) fn normals_of_heights(size: [u32; 2], heights: &[f32], bump: f32, clamp: bool) -> Texels {
+    let [width, height] = size.map(i64::from);
     let at = |x: i64, y: i64| {
         let inside = |i: i64, n: i64| if clamp { i.clamp(0, n - 1) } else { i.rem_euclid(n) };
-        let [r, g, b, _] = heights.texels[(inside(y, height) * width + inside(x, width)) as usize];
-        f32::from(u16::from(r) + u16::from(g) + u16::from(b)) / 765.0
+        heights[(inside(y, height) * width + inside(x, width)) as usize]
     };
     let scale = 0.5 * HEIGHT * bump;
     let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -33,7 +38,7 @@ pub(super) fn normals_of_heights(heights: &Texels, bump: f32, clamp: bool) -> Te
         let [r, g, b] = ((normal * 0.5 + 0.5) * 255.0).round().to_array().map(|c| c as u8);
         [r, g, b, 255]
     });
-    Texels { width: heights.width, height: heights.height, texels: texels.collect() }
+    Texels { width: size[0], height: size[1], texels: texels.collect() }
 }
 
 #[cfg(test)]
@@ -44,7 +49,8 @@ mod tests {
     fn a_slope_to_the_right_tilts_to_the_left_and_one_upward_down() {
         let slope = |f: fn(u32, u32) -> u8| {
             let texels = (0..64).map(|i| [f(i % 8, i / 8); 4]).collect();
-            let normals = normals_of_heights(&Texels { width: 8, height: 8, texels }, 10.0, true);
+            let heights = heights_of(&Texels { width: 8, height: 8, texels });
+            let normals = normals_of_heights([8, 8], &heights, 10.0, true);
             assert!(!is_normal_map(&Texels { texels: vec![[200; 4]; 4], width: 2, height: 2 }));
             normals.texels[3 * 8 + 3]
         };

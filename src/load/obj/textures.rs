@@ -4,7 +4,7 @@ use super::lines::{before_comment, unquoted};
 use super::map::{BESIDE, Map};
 use super::relief;
 use crate::load::error::ReadError;
-use crate::load::picture::{self, Picture};
+use crate::load::picture::{self, Decoded, Picture};
 use crate::load::report::Sink;
 use crate::load::source::{Bytes, Folder, IMAGE_LIMIT};
 use crate::scene::{Encoding, Filter, NormalMap, Texels, Texture, TextureUse};
@@ -55,6 +55,8 @@ fn read_named(folder: &Folder, library: Option<&str>, own: &str) -> Result<Bytes
 pub(super) struct Textures {
     file: String,
     images: BTreeMap<String, Arc<Texels>>,
+    /// Of those that a bump map names and that have 16 bits: see [`Decoded::brightness`].
+    heights: BTreeMap<String, Vec<u16>>,
     /// Names of those that could not be had.
     missing: BTreeSet<String>,
     spawned: BTreeMap<Key, Entity>,
@@ -80,23 +82,28 @@ impl Textures {
                     bytes: read(folder, name),
                     strict: false,
                     instead: "the surface stays flat",
+                    deep: false,
                 });
                 if !matches!(keyword, "map_Bump" | "norm") {
                     picture.instead = picture::CHECKER;
                 }
+                picture.deep |= keyword == "map_Bump";
             }
         }
         let (names, pictures): (Vec<String>, Vec<Picture<'_>>) = pictures.into_iter().unzip();
-        let texels = picture::decode_all(file, &pictures, sink);
+        let decoded = picture::decode_all(file, &pictures, sink);
         let mut missing = BTreeSet::new();
-        let mut images = BTreeMap::new();
-        for (name, texels) in names.into_iter().zip(texels) {
-            if texels.is_none() {
+        let (mut images, mut heights) = (BTreeMap::new(), BTreeMap::new());
+        for (name, decoded) in names.into_iter().zip(decoded) {
+            let Some(Decoded { texels, brightness }) = decoded else {
                 missing.insert(name.clone());
-            }
-            images.insert(name, texels.unwrap_or_else(picture::stand_in));
+                images.insert(name, picture::stand_in());
+                continue;
+            };
+            heights.extend(brightness.map(|brightness| (name.clone(), brightness)));
+            images.insert(name, texels);
         }
-        Self { file: file.to_owned(), images, missing, spawned: BTreeMap::new() }
+        Self { file: file.to_owned(), images, heights, missing, spawned: BTreeMap::new() }
     }
 
     /// Whether the material has such a statement, and its picture is there.
@@ -171,10 +178,20 @@ impl Textures {
             });
         }
         let texels = if is_normal_map {
+            if self.heights.contains_key(map.name) {
+                let place = format!("texture `{}`", map.name.replace(BESIDE, "/"));
+                sink.approximated(&self.file, &place, picture::IN_EIGHT_BITS);
+            }
             texels
         } else {
             self.afford(&texels, &map, sink)?;
-            Arc::new(relief::normals_of_heights(&texels, map.bump, map.clamp))
+            let heights = match self.heights.get(map.name) {
+                Some(deep) => map.of_brightness(deep),
+                None => None,
+            };
+            let heights = heights.unwrap_or_else(|| relief::heights_of(&texels));
+            let size = [texels.width, texels.height];
+            Arc::new(relief::normals_of_heights(size, &heights, map.bump, map.clamp))
         };
         let texture = self.spawn(key, texels, Encoding::Linear, &map, sink);
         Some(NormalMap { texture, scale: if is_normal_map { map.bump } else { 1.0 } })
@@ -193,6 +210,12 @@ impl Textures {
         let statements = keywords.map(|keyword| statement(material, keyword));
         let maps = statements.map(|statement| statement.map(Map::parse));
         let main = maps[0].as_ref().or(maps[1].as_ref())?.clone();
+        if let [Some(first), Some(second)] = &maps
+            && !first.lies_as(second)
+        {
+            let what = format!("options of {} count for {} too", keywords[0], keywords[1]);
+            sink.approximated(&self.file, &format!("material `{}`", material.name), what);
+        }
         let [a, b] = maps.each_ref().map(|map| map.as_ref().map_or(String::new(), Map::source));
         let key = (kind, a, b, main.clamp);
         if let Some(&known) = self.spawned.get(&key) {

@@ -84,10 +84,11 @@ pub(super) fn spawn_all(settings: &Settings, sink: &mut Sink<'_>) -> Result<Mate
             bytes: settings.folder.read_or_neighbour(name, IMAGE_LIMIT),
             strict: false,
             instead: picture::CHECKER,
+            deep: false,
         })
         .collect();
     let decoded = picture::decode_all(&settings.file, &pictures, sink).into_iter();
-    let texels = decoded.map(|texels| texels.unwrap_or_else(picture::stand_in));
+    let texels = decoded.map(|texels| texels.map_or_else(picture::stand_in, |done| done.texels));
     let images: BTreeMap<&str, Arc<Texels>> = names.into_iter().zip(texels).collect();
     let mut materials = Materials::default();
     for (name, table) in tables {

@@ -1,0 +1,66 @@
+//! A folder in place of a scene: which scenes are in it.
+
+use super::error::LoadError;
+use super::source::{TEXT_LIMIT, read_file};
+use super::{SceneFiles, SceneSource};
+use std::path::{Path, PathBuf};
+
+/// Folders within folders that are looked into.
+const DEEPEST: usize = 8;
+/// More are not looked for.
+const MOST_SCENES: usize = 10_000;
+/// How many a message names.
+const MOST_NAMED: usize = 8;
+
+/// The scenes in a folder and in those below it, by path: `.gltf`, `.glb` and `.obj`, and `.toml` with models. Links to folders
+/// are not followed.
+#[must_use]
+pub fn scenes_in(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    look_into(folder, DEEPEST, &mut found);
+    found.sort();
+    found
+}
+
+fn look_into(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
+        let (path, is_folder) = (entry.path(), entry.file_type().is_ok_and(|kind| kind.is_dir()));
+        if is_folder && depth > 0 {
+            look_into(&path, depth - 1, found);
+        } else if found.len() < MOST_SCENES && is_scene(&path) {
+            found.push(path);
+        }
+    }
+}
+
+fn is_scene(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let is_named_so = matches!(ending.as_deref(), Some("gltf" | "glb" | "obj" | "toml"));
+    // macOS leaves such beside the files of archives.
+    let is_shadow = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("._"));
+    if !is_named_so || is_shadow || !path.is_file() {
+        return false;
+    }
+    let has_models = || {
+        let text = read_file(path, TEXT_LIMIT, &SceneFiles::default()).unwrap_or_default();
+        text.windows(b"[[model]]".len()).any(|word| word == b"[[model]]")
+    };
+    ending.as_deref() != Some("toml") || has_models()
+}
+
+/// The one scene in a folder: of those in the folder itself or, if there are none, of those further down.
+pub(super) fn only_scene(folder: &Path) -> Result<SceneSource, LoadError> {
+    let all = scenes_in(folder);
+    let here: Vec<PathBuf> = all.iter().filter(|path| path.parent() == Some(folder)).cloned().collect();
+    let scenes = if here.is_empty() { all } else { here };
+    if let [only] = scenes.as_slice() {
+        return Ok(SceneSource::File(only.clone()));
+    }
+    let names: Vec<_> = scenes.iter().take(MOST_NAMED).map(|path| path.to_string_lossy()).collect();
+    let names = match scenes.len() {
+        0 => "no .gltf, .glb or .obj file is in it".to_owned(),
+        count if count > MOST_NAMED => format!("name one of its {count} scenes: {}, ...", names.join(", ")),
+        _ => format!("name one of its scenes: {}", names.join(", ")),
+    };
+    Err(LoadError::Folder { folder: folder.to_string_lossy().into_owned(), names })
+}
