@@ -82,6 +82,10 @@ pub const ALL_LIGHTS: usize = 8;
 /// Of up to this many it is found out what is in their way; they are the bits of a word. Of a room's 24 panels most are seen whole,
 /// and none of these is left to chance.
 pub const KNOWN_LIGHTS: usize = 32;
+/// So often one of up to [`KNOWN_LIGHTS`] is chosen evenly: what they are expected to bring does not know what is in between.
+const EVENLY: f32 = 0.25;
+/// The same of more: of these hardly two can be mistaken for all light there is, and each even choice costs.
+const RARELY: f32 = 0.1;
 /// Up to this many solid lights are not worth a hierarchy.
 const FEW_SHAPES: usize = 4;
 /// Of more solid shapes nobody asks whether one is in view.
@@ -173,19 +177,20 @@ impl Lights {
         if self.samples_all(depth) {
             return Some((Pick { light: index as u32, chance: 1.0 }, random));
         }
-        if self.all_alike {
-            let place = random * self.lights.len() as f32;
+        let evenly = self.evenly();
+        if random < evenly {
+            let place = random / evenly * self.lights.len() as f32;
             let light = (place as usize).min(self.lights.len() - 1) as u32;
             return Some((Pick { light, chance: self.chance(depth, light, to) }, place.fract()));
         }
-        let place = random * self.groups();
+        let place = (random - evenly) / (1.0 - evenly) * self.groups();
         if let Some(&light) = self.unplaced.get(place as usize) {
-            return Some((Pick { light, chance: 1.0 / self.groups() }, place.fract()));
+            return Some((Pick { light, chance: self.mixed(1.0) }, place.fract()));
         }
-        let chosen = self.tree.sample(to, place.fract())?;
         count(Feature::LightChoice);
+        let chosen = self.tree.sample(to, place.fract())?;
         let light = self.placed[chosen.emitter];
-        Some((Pick { light, chance: chosen.chance / self.groups() }, chosen.rest))
+        Some((Pick { light, chance: self.mixed(chosen.chance) }, chosen.rest))
     }
 
     /// The [`Pick::chance`] of `light` after `depth` bounces.
@@ -194,14 +199,26 @@ impl Lights {
         if self.samples_all(depth) {
             return 1.0;
         }
-        if self.all_alike {
-            return 1.0 / self.lights.len() as f32;
-        }
         let among = match self.places[light as usize] {
             u32::MAX => 1.0,
             place => self.tree.chance(to, place as usize),
         };
-        among / self.groups()
+        self.mixed(among)
+    }
+
+    /// How often one is chosen evenly.
+    fn evenly(&self) -> f32 {
+        match self.lights.len() {
+            _ if self.all_alike => 1.0,
+            ..=KNOWN_LIGHTS => EVENLY,
+            _ => RARELY,
+        }
+    }
+
+    /// The chance of one that has this chance `among` its group, if it is chosen so.
+    fn mixed(&self, among: f32) -> f32 {
+        let evenly = self.evenly();
+        evenly / self.lights.len() as f32 + (1.0 - evenly) * among / self.groups()
     }
 
     /// Suns and skies each, and all that is in the scene together, are chosen alike.

@@ -70,7 +70,7 @@ pub(super) struct Group {
 /// looked into: among those their intensity decides.
 const FAR: f32 = 6.0;
 /// What they are expected to bring does not know what is in between: so often their intensity and their number decide alike.
-const BLIND: f32 = 0.2;
+const BLIND: f32 = 0.1;
 
 impl Node {
     /// Of these, with the intensity of each in all.
