@@ -342,12 +342,8 @@ mod tests {
     /// Nothing that is switched off may change the picture but for its noise.
     #[test]
     fn all_methods_make_the_same_picture_in_the_end() {
-        for (scene, integrator) in [
-            ("cornell", Integrator::Path),
-            ("gallery", Integrator::Path),
-            ("gallery", Integrator::Direct),
-            ("cornell-gltf", Integrator::Path),
-        ] {
+        // Every shape of lamp, and a mesh that shines.
+        for (scene, integrator) in [("gallery", Integrator::Path), ("cornell-gltf", Integrator::Path)] {
             let app = opened(scene, 24, integrator);
             let truth = brightness(&app, method(OURS), 1000..1032, 128);
             for method in &METHODS {
