@@ -4,7 +4,7 @@ use super::super::error::LoadError;
 use super::super::source::without_bom;
 use std::borrow::Cow;
 
-/// How ZBrush begins a comment that holds the colours of vertices, in hexadecimal digits: mask, red, green, blue.
+/// How `ZBrush` begins a comment that holds the colours of vertices, in hexadecimal digits: mask, red, green, blue.
 pub(super) const POLYPAINT: &str = "#MRGB";
 
 /// The text of a file, without byte order mark, and without the mark of CP/M or the zeros behind its last line. What is neither UTF-8 nor

@@ -56,7 +56,7 @@ pub(super) struct Raw {
     pub(super) origin: DVec3,
     /// Empty, or as long as `places`.
     pub(super) colors: Vec<Vec3>,
-    /// What comments of ZBrush say of the vertices, in their order.
+    /// What comments of `ZBrush` say of the vertices, in their order.
     painted: Vec<[u8; 3]>,
     pub(super) uvs: Vec<Vec2>,
     pub(super) normals: Vec<Vec3>,
@@ -203,7 +203,7 @@ impl Raw {
         self.positions = places.into_iter().map(|place| (place - self.origin).as_vec3()).collect();
     }
 
-    /// Takes the colours that ZBrush writes in comments, if there is one for each vertex and no other.
+    /// Takes the colours that `ZBrush` writes in comments, if there is one for each vertex and no other.
     pub(super) fn take_paint(&mut self, file: &str, sink: &mut Sink<'_>) {
         let painted = std::mem::take(&mut self.painted);
         if painted.is_empty() || !self.colors.is_empty() {

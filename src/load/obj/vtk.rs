@@ -1,4 +1,4 @@
-//! What VTK and ParaView mean by the statements of their MTL libraries.
+//! What VTK and `ParaView` mean by the statements of their MTL libraries.
 //!
 //! Their exporter (`vtkOBJExporter`) writes the opacity after `Tr`, the colour of highlights without its strength after `Ks`
 //! (the strength is 0 unless somebody asks for more), and `illum 3` for everything.
