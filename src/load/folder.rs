@@ -1,14 +1,16 @@
 //! A folder in place of a scene: which scenes are in it.
 
 use super::error::LoadError;
-use super::source::{TEXT_LIMIT, read_file};
+use super::source::read_file;
 use super::{SceneFiles, SceneSource};
 use std::path::{Path, PathBuf};
 
 /// Folders within folders that are looked into.
 const DEEPEST: usize = 8;
-/// More are not looked for.
-const MOST_SCENES: usize = 10_000;
+/// More files and folders are not looked at: somebody's whole disk is not a folder of scenes.
+const MOST_ENTRIES: usize = 100_000;
+/// Settings with models are shorter than this, bytes.
+const MOST_SETTINGS: u64 = 1 << 20;
 /// How many a message names.
 const MOST_NAMED: usize = 8;
 
@@ -16,18 +18,26 @@ const MOST_NAMED: usize = 8;
 /// are not followed.
 #[must_use]
 pub fn scenes_in(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    look_into(folder, DEEPEST, &mut found);
+    scenes_down_to(folder, DEEPEST)
+}
+
+fn scenes_down_to(folder: &Path, depth: usize) -> Vec<PathBuf> {
+    let (mut found, mut left) = (Vec::new(), MOST_ENTRIES);
+    look_into(folder, depth, &mut left, &mut found);
     found.sort();
     found
 }
 
-fn look_into(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
+fn look_into(folder: &Path, depth: usize, left: &mut usize, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
+        if *left == 0 {
+            return;
+        }
+        *left -= 1;
         let (path, is_folder) = (entry.path(), entry.file_type().is_ok_and(|kind| kind.is_dir()));
         if is_folder && depth > 0 {
-            look_into(&path, depth - 1, found);
-        } else if found.len() < MOST_SCENES && is_scene(&path) {
+            look_into(&path, depth - 1, left, found);
+        } else if is_scene(&path) {
             found.push(path);
         }
     }
@@ -42,7 +52,7 @@ fn is_scene(path: &Path) -> bool {
         return false;
     }
     let has_models = || {
-        let text = read_file(path, TEXT_LIMIT, &SceneFiles::default()).unwrap_or_default();
+        let text = read_file(path, MOST_SETTINGS, &SceneFiles::default()).unwrap_or_default();
         text.windows(b"[[model]]".len()).any(|word| word == b"[[model]]")
     };
     ending.as_deref() != Some("toml") || has_models()
@@ -50,9 +60,8 @@ fn is_scene(path: &Path) -> bool {
 
 /// The one scene in a folder: of those in the folder itself or, if there are none, of those further down.
 pub(super) fn only_scene(folder: &Path) -> Result<SceneSource, LoadError> {
-    let all = scenes_in(folder);
-    let here: Vec<PathBuf> = all.iter().filter(|path| path.parent() == Some(folder)).cloned().collect();
-    let scenes = if here.is_empty() { all } else { here };
+    let here = scenes_down_to(folder, 0);
+    let scenes = if here.is_empty() { scenes_in(folder) } else { here };
     if let [only] = scenes.as_slice() {
         return Ok(SceneSource::File(only.clone()));
     }

@@ -5,7 +5,7 @@ use super::bsdf::{Bsdf, Evaluated, Lobes};
 use super::emitter::Receiver;
 use super::integrator::Batch;
 use super::light::LightSample;
-use super::lights::{KNOWN_LIGHTS, Pick};
+use super::lights::Pick;
 use super::path::{LIGHT, PAIRS_PER_BOUNCE, PICK, Path};
 use super::sampler::Sampler;
 use super::surface::Interaction;
@@ -34,6 +34,9 @@ pub(super) struct Look {
     pub(super) u: Vec2,
 }
 
+/// Among so many lights one is chosen by ten of the 24 digits of a random number.
+const DIGITS_FOR: usize = 1024;
+
 /// All that are taken at a vertex after `depth` bounces.
 pub(super) fn looks<'a>(
     scene: &'a TraceScene<'a>,
@@ -50,7 +53,7 @@ pub(super) fn looks<'a>(
             let u = sampler.pair(base + LIGHT + index as u32 * 2);
             // One number for which light and where on it, so that samples are spread over all of them together; of very many it
             // has not digits enough.
-            let is_one = scene.lights.len() <= KNOWN_LIGHTS;
+            let is_one = scene.lights.len() <= DIGITS_FOR;
             let random = if by_chance && !is_one { sampler.pair(base + PICK).x } else { u.x };
             let (mut pick, rest) = scene.lights.pick(depth, index, &to, random)?;
             pick.chance *= members as f32;

@@ -83,6 +83,10 @@ fn vtk_says_opacity_by_tr_and_nothing_by_illum_3() {
     assert_eq!(said, 1);
     let (_, thin, _) = material(head, &statements("0.25"));
     assert_eq!((thin.opacity, thin.alpha), (0.25, Alpha::Blend));
+    // New versions write strengths: without one, and with.
+    let newer = |ks: &str| format!("Ka 0 0 0\nKd 0.8 0.2 0.1\nKs {ks}\nNs 30\nTr 1\nillum 3");
+    assert_eq!(material(head, &newer("0 0 0")).1.glossy, Glossy::None);
+    assert_ne!(material(head, &newer("0.5 0.5 0.5")).1.glossy, Glossy::None);
     // Others mean a mirror, and what Tr says.
     let (_, mirror, _) = material("", &statements("0.25"));
     assert!(mirror.mirror != Vec3::ZERO && mirror.opacity == 0.75);

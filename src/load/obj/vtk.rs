@@ -1,7 +1,7 @@
 //! What VTK and `ParaView` mean by the statements of their MTL libraries.
 //!
-//! Their exporter (`vtkOBJExporter`) writes the opacity after `Tr`, the colour of highlights without its strength after `Ks`
-//! (the strength is 0 unless somebody asks for more), and `illum 3` for everything.
+//! Their exporter (`vtkOBJExporter`) writes the opacity after `Tr`, and `illum 3` for everything. Old versions write bare
+//! colours after `Ka` and `Ks`, without their strengths (which are 0 unless somebody asks for more); new ones multiply them.
 
 /// Whether VTK wrote the library.
 pub(super) fn is_by_vtk(text: &str) -> bool {
@@ -13,9 +13,12 @@ pub(super) fn restate(material: &mut tobj::Material) {
     if let Some(opacity) = material.unknown_param.remove("Tr") {
         material.dissolve = material.dissolve.or_else(|| opacity.parse().ok());
     }
-    (material.specular, material.illumination_model) = (None, Some(2));
+    // What surrounds has no strength unless somebody asks for it: if it has a colour all the same, that is bare.
+    if material.ambient.is_some_and(|ambient| ambient != [0.0; 3]) {
+        material.specular = None;
+    }
+    material.illumination_model = Some(2);
 }
 
 /// [`restate`], in a line.
-pub(super) const WHAT: &str =
-    "written by VTK: Tr says how opaque a surface is, Ks has no strength, illum 3 is no mirror";
+pub(super) const WHAT: &str = "written by VTK: Tr says how opaque a surface is, illum 3 is no mirror, and Ks beside a bright Ka has no strength";

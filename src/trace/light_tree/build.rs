@@ -110,7 +110,7 @@ fn part(
     let is_one_way = |emitter: &Emitter| emitter.spread <= ALIKE;
     let is_every_way = |emitter: &Emitter| emitter.spread >= PI;
     let same = is_one_way(&all) || is_every_way(&first) && is_every_way(&second);
-    let alike = first_alike && second_alike && same;
+    let alike = first_alike && second_alike && same && first.two_sided == second.two_sided;
     pairs[at] = Some(Pair { group: Group { all, alike, places }, child });
     (all, alike)
 }

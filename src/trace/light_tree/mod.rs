@@ -1,11 +1,11 @@
 //! Which of many emitters to sample at a point: a hierarchy over them, descended by how much each part may bring.
 //!
-//! Every node has up to sixteen children; of each it knows a box and a cone of normals around its emitters and their
-//! intensity; from these follows what they could bring to a point at most, nearly, computed of all children at once. The way
+//! Every node has up to sixteen children; of each it knows a ball around its emitters, their intensity and to which sides they
+//! send it on average; from these follows what they bring to a point, nearly, computed of all children at once. The way
 //! down is chosen in proportion, so that the cost grows with the logarithm of their number.
 //!
 //! Reference: A. Conty Estevez, C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", Proc. ACM
-//! Computer Graphics and Interactive Techniques 1(2), 2018. Theirs has two children to a node.
+//! Computer Graphics and Interactive Techniques 1(2), 2018. Theirs has two children to a node, and bounds by cones of normals.
 
 mod build;
 mod node;
@@ -220,8 +220,8 @@ mod tests {
         assert_eq!(LightTree::new(&[]).sample(&HERE, 0.5), None);
     }
 
-    /// What would be best is known: as much as each one brings; the second moment of its samples is 1. That of the tree is near, that
-    /// of choosing by power is not.
+    /// What would be best is known: as much as each one brings; the second moment of its samples is 1. That of the tree is near, also
+    /// in the midst of them; that of choosing by power is not.
     #[test]
     fn the_choice_follows_what_they_bring() {
         for all_round in [false, true] {
@@ -229,8 +229,8 @@ mod tests {
             let emitters = scattered(3000).into_iter().map(|e| if all_round { round(e) } else { e });
             let emitters: Vec<Emitter> = emitters.collect();
             let tree = LightTree::new(&emitters);
-            let brought = |emitter: &Emitter| {
-                let along = emitter.bounds.center() - HERE.point;
+            let brought = |emitter: &Emitter, to: &Receiver| {
+                let along = emitter.bounds.center() - to.point;
                 let toward = along.normalize();
                 let cosine = -emitter.axis.dot(toward);
                 let sent = match emitter.two_sided {
@@ -238,19 +238,45 @@ mod tests {
                     true => cosine.abs(),
                     false => cosine.max(0.0),
                 };
-                f64::from(
-                    emitter.intensity * sent * HERE.normal.dot(toward).max(0.0) / along.length_squared(),
-                )
+                f64::from(emitter.intensity * sent * to.normal.dot(toward).max(0.0) / along.length_squared())
             };
-            let total: f64 = emitters.iter().map(brought).sum();
             let power: f64 = emitters.iter().map(|e| f64::from(e.intensity)).sum();
-            let second = |chance: &dyn Fn(usize) -> f64| {
-                emitters.iter().enumerate().map(|(i, e)| brought(e).powi(2) / chance(i)).sum::<f64>()
-                    / total.powi(2)
-            };
-            let by_tree = second(&|i| f64::from(tree.chance(&HERE, i)));
-            let by_power = second(&|i| f64::from(emitters[i].intensity) / power);
-            assert!(by_tree < 2.0 && 2.0 * by_tree < by_power, "{all_round}: {by_tree}, power {by_power}");
+            let (mut random, points) = (numbers(4), 40);
+            let mut next = || random.next().unwrap_or_default();
+            let mut sums = [0.0; 2];
+            for _ in 0..points {
+                let mut vector = || Vec3::new(next(), next(), next());
+                let to = Receiver { point: vector() * 10.0, normal: (vector() - 0.5).normalize() };
+                let total: f64 = emitters.iter().map(|e| brought(e, &to)).sum();
+                let second = |chance: &dyn Fn(usize) -> f64| {
+                    let squares =
+                        emitters.iter().enumerate().map(|(i, e)| brought(e, &to).powi(2) / chance(i));
+                    squares.sum::<f64>() / (total * total)
+                };
+                sums[0] += second(&|i| f64::from(tree.chance(&to, i))) / f64::from(points);
+                sums[1] += second(&|i| f64::from(emitters[i].intensity) / power) / f64::from(points);
+            }
+            let [by_tree, by_power] = sums;
+            assert!(by_tree < 3.0 && 4.0 * by_tree < by_power, "{all_round}: {by_tree}, power {by_power}");
+        }
+    }
+
+    /// Where nothing can be computed, one is chosen all the same.
+    #[test]
+    fn what_is_infinitely_far_or_strong_ends() {
+        let at = |place: f32, intensity| Emitter::all_round(Aabb::around(&[Vec3::splat(place)]), intensity);
+        for odd in [at(f32::INFINITY, 1.0), at(1e30, 1.0), at(1.0, f32::INFINITY), at(f32::NAN, 1.0)] {
+            let mut emitters = vec![at(0.5, 1.0); 40];
+            emitters[0] = odd;
+            let tree = LightTree::new(&emitters);
+            for random in numbers(5).take(100) {
+                let chosen = tree.sample(&HERE, random);
+                assert!(
+                    chosen.is_none_or(|chosen| chosen.emitter < 40 && chosen.chance <= 1.0),
+                    "{chosen:?}"
+                );
+            }
+            assert!((0..40).all(|i| !tree.chance(&HERE, i).is_nan()), "{odd:?}");
         }
     }
 

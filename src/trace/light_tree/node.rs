@@ -17,7 +17,7 @@ pub(super) struct Node {
     center: [Row; 3],
     radius: Row,
     inverse: Row,
-    /// [`super::Sides`], in parts of the intensity of all: squares without their weight.
+    /// [`crate::trace::emitter::Sides`], in parts of the intensity of all: squares without their weight.
     weight: Row,
     squares: [Row; 6],
     front: [Row; 3],
@@ -31,6 +31,7 @@ pub(super) struct Node {
     far: Row,
     facing: Row,
     pub(super) children: [Child; WIDTH],
+    last: usize,
     /// The node above, and which of its children this is.
     pub(super) parent: (u32, u32),
 }
@@ -72,16 +73,24 @@ const FAR: f32 = 6.0;
 /// What they are expected to bring does not know what is in between: so often their intensity and their number decide alike.
 const BLIND: f32 = 0.1;
 
+/// The squared distance of those around a point is at least this part of that of their ball's radius. With [`ANYWHERE`] tried on
+/// 3000 emitters around sixty points: second moment 10 without, 2.2 with both; more or less of either has more.
+const CLOSE: f32 = 0.4;
+/// What is sent at least, as if it were a part of the intensity, from within the ball; it falls with the squared distance.
+const ANYWHERE: f32 = 0.1;
+
 impl Node {
     /// Of these, with the intensity of each in all.
     pub(super) fn new(groups: &[(&Group, f64)], parent: (u32, u32)) -> Self {
-        let mut node = Self { parent, ..Self::default() };
+        let ends = [f32::NEG_INFINITY; WIDTH];
+        let last = groups.len() - 1;
+        let mut node = Self { parent, last, far: ends, facing: ends, ..Self::default() };
         let sum: f64 = groups.iter().map(|(_, intensity)| intensity).sum();
+        let is_something = sum > 0.0 && sum < f64::INFINITY;
         let count: usize = groups.iter().map(|(group, _)| group.places.len()).sum();
         let mut blinds = 0.0;
         for (i, &(Group { all, alike, places }, intensity)) in groups.iter().enumerate() {
-            let share = intensity / sum;
-            let share = if share.is_finite() { share as f32 } else { 1.0 / groups.len() as f32 };
+            let share = if is_something { (intensity / sum) as f32 } else { 1.0 / groups.len() as f32 };
             let blind = 0.5 * (share + places.len() as f32 / count as f32);
             blinds += blind;
             (node.share[i], node.blind[i], node.blinds[i]) = (share, blind, blinds);
@@ -124,6 +133,8 @@ impl Node {
         // Not where none is expected to bring anything, or one is infinitely near.
         if (seeing > 0.0) & (seeing < f32::INFINITY) {
             (seen.seeing, seen.blind) = (seeing, BLIND);
+        } else {
+            (seen.brought, seen.sums) = (zeros, zeros);
         }
         seen
     }
@@ -143,7 +154,7 @@ impl Node {
         let end = |i: usize| seen.sums[i] * seen.seeing + self.blinds[i] * seen.blind;
         let wanted = random * end(WIDTH - 1);
         let child = ends.le(weight(wanted)).bits().count_ones() as usize;
-        let child = child.min(WIDTH - 1);
+        let child = child.min(self.last);
         let chance = self.chance(seen, child);
         (child, chance, (wanted - (end(child) - chance)) / chance)
     }
@@ -157,8 +168,9 @@ impl Node {
             [self.center[0][i] - to.point.x, self.center[1][i] - to.point.y, self.center[2][i] - to.point.z];
         let distance2 = x * x + y * y + z * z;
         let radius = self.radius[i];
-        // From inside of the ball around them, they may be anywhere.
-        let inverse = 1.0 / distance2.max(radius * radius).max(1e-30);
+        let radius2 = radius * radius;
+        // From inside of the ball around them, they are not as near as their middle.
+        let inverse = 1.0 / distance2.max(radius2 * CLOSE).max(1e-30);
         let [xx, yy, zz, yz, zx, xy] = &self.squares;
         let squares = x * (x * xx[i] + y * (2.0 * xy[i]))
             + y * (y * yy[i] + z * (2.0 * yz[i]))
@@ -170,15 +182,18 @@ impl Node {
         let above = height + radius;
         let straddling = above * above * self.inverse[i];
         let mean = select(height >= radius, height, select(above > 0.0, straddling, 0.0));
-        // Never quite dark: what shines through a surface arrives from behind, and rounding must not decide.
+        // From there they are in all directions. Never quite dark: what shines through a surface arrives from behind, and rounding
+        // must not decide.
         let arriving = mean.max(0.05 * height.abs());
-        let sending = sent.max(0.05 * self.share[i] * radius);
+        let sending = sent + ANYWHERE * self.share[i] * radius * (radius2 * inverse);
         (height, sent, sending * arriving * inverse * inverse)
     }
 
     /// Whether nothing is to be chosen in a child but by intensity.
     #[inline(always)]
     pub(super) fn is_end(&self, i: usize, seen: &Seen) -> bool {
-        (seen.height[i] > self.far[i]) & (seen.sent[i] > self.facing[i])
+        // What is not a number is an end, too.
+        let goes_on = (seen.height[i] <= self.far[i]) | (seen.sent[i] <= self.facing[i]);
+        !goes_on
     }
 }

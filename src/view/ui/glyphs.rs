@@ -66,14 +66,16 @@ impl Glyphs {
     pub fn fetch(&mut self, context: &Context) -> bool {
         let missing = context.data_mut(|data| data.remove_temp::<HashSet<char>>(asked())).unwrap_or_default();
         let new: Vec<char> = missing.into_iter().filter(|&c| self.0.insert(c)).collect();
-        let Some(&first) = new.first() else { return false };
-        let Some((path, bytes)) = find(&folders(), first) else { return false };
+        if new.is_empty() {
+            return false;
+        }
+        let Some((path, font)) = find(&folders(), &new) else { return false };
         let family = |family| InsertFontFamily { family, priority: FontPriority::Lowest };
         let families = vec![family(FontFamily::Proportional), family(FontFamily::Monospace)];
         let name = path.display().to_string();
-        context.add_font(FontInsert::new(&name, FontData::from_owned(bytes), families));
-        // The others may be in it, or in another.
-        self.0.retain(|c| *c == first || !new.contains(c));
+        context.add_font(FontInsert::new(&name, FontData::from_owned(font.as_slice().to_vec()), families));
+        // The others may be in another.
+        self.0.retain(|c| !new.contains(c) || font.glyph_id(*c).0 != 0);
         true
     }
 }
@@ -91,8 +93,8 @@ fn folders() -> Vec<PathBuf> {
     folders
 }
 
-/// A font with this letter. A file that is none, or broken, is passed over.
-fn find(folders: &[PathBuf], letter: char) -> Option<(PathBuf, Vec<u8>)> {
+/// A font with one of these letters. A file that is none, or broken, is passed over.
+fn find(folders: &[PathBuf], letters: &[char]) -> Option<(PathBuf, FontVec)> {
     let mut left = MOST_ENTRIES;
     let mut files = Vec::new();
     folders.iter().for_each(|folder| collect(folder, DEEPEST, &mut left, &mut files));
@@ -106,7 +108,7 @@ fn find(folders: &[PathBuf], letter: char) -> Option<(PathBuf, Vec<u8>)> {
         let bytes = (size <= MOST_BYTES).then(|| std::fs::read(&path).ok()).flatten()?;
         // egui panics if it is none.
         let font = FontVec::try_from_vec_and_index(bytes, 0).ok()?;
-        (font.glyph_id(letter).0 != 0).then(|| (path, font.as_slice().to_vec()))
+        letters.iter().any(|&letter| font.glyph_id(letter).0 != 0).then_some((path, font))
     })
 }
 
@@ -147,10 +149,14 @@ mod tests {
         {
             std::fs::write(folder.join(name), broken).unwrap();
         }
-        let found = find(std::slice::from_ref(&folder), 'é').unwrap();
-        assert_eq!(found, (folder.join("a/b/NotoSansCJK-Regular.ttf"), font));
-        assert!(find(std::slice::from_ref(&folder), '中').is_none());
-        assert!(find(&[folder.join("none")], 'é').is_none());
+        let here = std::slice::from_ref(&folder);
+        // Whatever letter is asked for first.
+        for letters in [&['é'][..], &['中', 'é'], &['é', '中']] {
+            let (path, found) = find(here, letters).unwrap();
+            assert_eq!((path, found.as_slice()), (folder.join("a/b/NotoSansCJK-Regular.ttf"), &font[..]));
+        }
+        assert!(find(here, &['中']).is_none());
+        assert!(find(&[folder.join("none")], &['é']).is_none());
         std::fs::remove_dir_all(&folder).unwrap();
     }
 
