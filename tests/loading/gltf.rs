@@ -164,13 +164,16 @@ fn punctual_lights_are_photometric_and_keep_their_angles() {
 /// What the numbers of lamps mean: by who wrote the file, by what shines beside them, or as the user says.
 #[test]
 fn units_of_lights_are_seen_from_the_file_or_said() {
-    let file = |generator: &str, intensity: f32, emissive: bool| {
+    let made_of = |material: &str, generator: &str, intensity: f32, emissive: bool| {
         let more = format!(
             r#","extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":{intensity}}}]}}}},"materials":[{{"emissiveFactor":[{},0,0]}}]"#,
             u8::from(emissive)
         );
-        gltf_triangle(r#","extensions":{"KHR_lights_punctual":{"light":0}}"#, "", &more)
+        gltf_triangle(r#","extensions":{"KHR_lights_punctual":{"light":0}}"#, material, &more)
             .replace(r#""version":"2.0""#, &format!(r#""version":"2.0","generator":"{generator}""#))
+    };
+    let file = |generator: &str, intensity: f32, emissive: bool| {
+        made_of(r#","material":0"#, generator, intensity, emissive)
     };
     let shown = |text: &str, options: &LoadOptions| {
         let (mut world, result) = Folder::new(&[("a.gltf", text.as_bytes())]).load_with("a.gltf", options);
@@ -192,6 +195,9 @@ fn units_of_lights_are_seen_from_the_file_or_said() {
         assert!((found / expected - 1.0).abs() < 1e-5, "{generator} {intensity}: {found}");
         assert!(said.contains(words) && said.contains("--light-units"), "{generator} {intensity}: {said}");
     }
+    // A material that nothing is made of says nothing.
+    let (found, _) = shown(&made_of("", "THREE.GLTFExporter", 683.0, true), &usual);
+    assert!((found - 1.0).abs() < 1e-5, "{found}");
     let told = |units| LoadOptions { light_units: Some(units), ..LoadOptions::default() };
     let text = file(blender, 683.0 * watts, false);
     assert!((shown(&text, &told(LightUnits::Watts)).0 / (683.0 * watts) - 1.0).abs() < 1e-5);
