@@ -136,6 +136,18 @@ pub enum LightUnits {
     Raw,
 }
 
+impl LightUnits {
+    /// As `--light-units` takes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Candela => "candela",
+            Self::Watts => "watts",
+            Self::Raw => "raw",
+        }
+    }
+}
+
 /// What the caller wants from [`load`].
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
@@ -251,6 +263,7 @@ fn load_into(source: &SceneSource, options: &LoadOptions, sink: &mut Sink<'_>) -
         );
     }
     sink.count();
+    sink.take_lamps(&file)?;
     framing::complete(&file, active, sink);
     let edits = Edits(settings);
     sink.report.render.origin = edits.origin();

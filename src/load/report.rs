@@ -2,9 +2,11 @@
 
 use super::LoadOptions;
 use super::budget::Budget;
+use super::error::LoadError;
 use super::settings::SidecarRender;
 use crate::scene::{Camera, Instance, Light, Material, Mesh, Texture};
 use bevy_ecs::prelude::*;
+use glam::Vec3;
 use serde::Serialize;
 use std::fmt;
 use std::sync::Arc;
@@ -14,6 +16,8 @@ use std::time::Instant;
 const MOST_REMARKS: usize = 200;
 /// Places that a remark names.
 const MOST_PLACES: usize = 4;
+/// Bytes that a triangle that shines takes, with what building the choice among many does.
+const LAMP_MEMORY: u64 = 380;
 
 /// What [`super::load`] found and did.
 #[derive(Clone, Debug, Default)]
@@ -295,6 +299,27 @@ impl<'w> Sink<'w> {
             found.lights += usize::from(entity.contains::<Light>());
             found.cameras += usize::from(entity.contains::<Camera>());
         }
+    }
+
+    /// Asks for the memory of all that shines: each triangle of each instance is a lamp to choose.
+    ///
+    /// # Errors
+    /// If that is more than is left.
+    pub(super) fn take_lamps(&self, file: &str) -> Result<(), LoadError> {
+        let instances = self.spawned.iter().filter_map(|&entity| self.world.get::<Instance>(entity));
+        let lamps = instances.map(|instance| self.lamps(instance)).sum::<u64>();
+        self.budget.take(lamps * LAMP_MEMORY, file, &format!("its {lamps} triangles that shine"))
+    }
+
+    /// Triangles of an instance that shine.
+    fn lamps(&self, Instance { mesh, materials }: &Instance) -> u64 {
+        let shines = |&entity: &Entity| {
+            self.world.get::<Material>(entity).is_some_and(|material| material.emission != Vec3::ZERO)
+        };
+        let shine: Vec<bool> = materials.iter().map(shines).collect();
+        let Some(Mesh(mesh)) = self.world.get(*mesh).filter(|_| shine.contains(&true)) else { return 0 };
+        let is_lamp = |&triangle: &usize| shine.get(mesh.slot(triangle)).copied().unwrap_or(false);
+        (0..mesh.triangles.len()).filter(is_lamp).count() as u64
     }
 
     /// The finished report.

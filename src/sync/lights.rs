@@ -12,6 +12,7 @@ use crate::trace::sky::SkyLight;
 use crate::trace::{Geometry, Lights, Surfaces};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, Vec3};
+use std::collections::BTreeMap;
 
 #[expect(clippy::too_many_arguments, reason = "all that may emit")]
 /// Makes the light list anew when a light changed, or something that emits may have.
@@ -159,29 +160,38 @@ fn mesh_lights(
     };
     let slots = 0..data.materials.len().max(1) as u16;
     let emissive = slots.filter(|&slot| surface(slot).emission != Vec3::ZERO);
-    let light = |slot: u16| {
+    let mut triangles: BTreeMap<u16, Vec<u32>> = emissive.map(|slot| (slot, Vec::new())).collect();
+    if triangles.is_empty() {
+        return Vec::new();
+    }
+    for triangle in 0..data.mesh.triangles.len() {
+        if let Some(own) = triangles.get_mut(&(data.mesh.slot(triangle) as u16)) {
+            own.push(triangle as u32);
+        }
+    }
+    let light = |(slot, own): (u16, Vec<u32>)| {
         let before = before.of_mesh(instance, slot).and_then(|light| match before.get(light) {
             FlatLight::Mesh(light) => Some(light),
             _ => None,
         });
-        mesh_light(instance, &data.mesh, slot, placed, surface(slot), before)
+        Some((slot, mesh_light(instance, &data.mesh, &own, placed, surface(slot), before)?))
     };
-    emissive.filter_map(|slot| Some((slot, light(slot)?))).collect()
+    triangles.into_iter().filter_map(light).collect()
 }
 
+/// Of the triangles of an instance that wear one material.
 fn mesh_light(
     instance: u32,
     mesh: &TriangleMesh,
-    slot: u16,
+    own: &[u32],
     placed: &DAffine3,
     material: &Material,
     before: Option<&MeshLight>,
 ) -> Option<MeshLight> {
     let mirrored = placed.matrix3.determinant() < 0.0;
-    let own = (0..mesh.triangles.len()).filter(|&triangle| mesh.slot(triangle) == usize::from(slot));
-    let triangles = own.map(|triangle| {
-        let corners = mesh.corners(triangle).map(|p| placed.transform_point3(p.as_dvec3()).as_vec3());
-        (triangle as u32, corners)
+    let triangles = own.iter().map(|&triangle| {
+        let corners = mesh.corners(triangle as usize);
+        (triangle, corners.map(|p| placed.transform_point3(p.as_dvec3()).as_vec3()))
     });
     let sides = [material.double_sided, mirrored];
     MeshLight::new(instance, triangles, sides, luminance(material.emission), before)

@@ -48,6 +48,17 @@ pub struct Sides {
 }
 
 impl Sides {
+    /// How little their normals have one direction, front or back: 0 if all are parallel, 1 if no direction is more frequent.
+    #[must_use]
+    pub fn scattered(&self) -> f32 {
+        let trace = self.squares[0] + self.squares[1] + self.squares[2];
+        let [xx, yy, zz, yz, zx, xy] = self.squares.map(|square| square / trace);
+        let norm2 = xx * xx + yy * yy + zz * zz + 2.0 * (yz * yz + zx * zx + xy * xy);
+        // The square of the Frobenius norm of a unit trace is from a third to 1. Of nothing that shines nothing is known.
+        let scattered = 1.5 * (1.0 - norm2);
+        if scattered >= 0.0 { scattered.min(1.0) } else { 0.0 }
+    }
+
     fn map(&self, other: &Self, f: impl Fn(f32, f32) -> f32) -> Self {
         let [(ax, ay, az), (bx, by, bz)] = [self.front.into(), other.front.into()];
         Self {
@@ -175,6 +186,21 @@ mod tests {
             let both = sent(of(normal, 1.0).union(&of(other, 2.0)).sides, to);
             assert!(both > alone(normal) + 2.0 * alone(other) - 1e-5 && both < 3.0 + 1e-5, "{both}");
             assert!((sent(Emitter::all_round(Aabb::EMPTY, 2.0).sides, to) - 2.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn normals_are_scattered_or_not() {
+        let flat = |normal: Vec3| Emitter::flat(Aabb::EMPTY, normal, false, 2.0);
+        let all = [Vec3::X, Vec3::NEG_Y, Vec3::Z].map(flat);
+        let scattered = |emitter: Emitter| emitter.sides.scattered();
+        let near = |value: f32, exact: f32| (value - exact).abs() < 1e-6;
+        assert!(near(scattered(all[0]), 0.0) && near(scattered(flat(Vec3::X).union(&flat(Vec3::NEG_X))), 0.0));
+        assert!(near(scattered(all[0].union(&all[1])), 0.75));
+        assert!(near(scattered(all[0].union(&all[1]).union(&all[2])), 1.0));
+        assert!(near(scattered(Emitter::all_round(Aabb::EMPTY, 3.0)), 1.0));
+        for nothing in [0.0, f32::INFINITY, f32::NAN] {
+            assert_eq!(scattered(all[0].times(nothing)), 0.0);
         }
     }
 

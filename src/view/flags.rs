@@ -72,19 +72,21 @@ pub fn camera_flags(camera: Camera, pose: GlobalTransform, lens: Option<Lens>) -
     flags
 }
 
-/// The flags that choose the sky, and the scene, variant, animation and time of a file.
+/// The flags that choose the sky, and the scene, variant, animation, time and units of lamps of a file.
 fn part_flags(world: &World) -> Vec<String> {
     let Some(origin) = world.get_resource::<SceneOrigin>() else { return Vec::new() };
-    let LoadOptions { scene, variant, animation, time, sky, .. } = &origin.options;
+    let LoadOptions { scene, variant, animation, time, sky, light_units, .. } = &origin.options;
     let playing = world.get_resource::<Playing>().and_then(|playing| playing.time);
     let time = playing.or(*time).map(|time| time.to_string());
     let sky = sky.as_deref().map(absolute);
+    let units = light_units.map(|units| units.name().to_owned());
     let flags = [
         ("--hdri", &sky),
         ("--gltf-scene", scene),
         ("--variant", variant),
         ("--animation", animation),
         ("--time", &time),
+        ("--light-units", &units),
     ];
     let given = flags.into_iter().filter_map(|(flag, value)| Some([flag.to_owned(), value.clone()?]));
     given.flatten().collect()

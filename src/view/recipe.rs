@@ -58,7 +58,7 @@ fn described(film: &Film) -> String {
 mod tests {
     use super::*;
     use crate::app::{App, FrameStats};
-    use crate::load::LoadOptions;
+    use crate::load::{LightUnits, LoadOptions};
     use crate::open::{Wishes, open};
     use glam::UVec2;
 
@@ -74,7 +74,9 @@ mod tests {
     fn samples_noise_and_part_are_those_of_this_moment() {
         let wishes = Wishes { size: Some(UVec2::new(48, 32)), ..Wishes::default() };
         let source = SceneSource::parse("cornell").unwrap();
-        let mut app = open(&source, &LoadOptions::default(), &wishes).unwrap().app;
+        let options = LoadOptions { light_units: Some(LightUnits::Raw), ..LoadOptions::default() };
+        let mut app = open(&source, &options, &wishes).unwrap().app;
+        assert!(recipe(&app.world).arguments.join(" ").contains("--light-units raw"));
         assert!(recipe(&app.world).description.ends_with("noise unknown"));
         framed(&mut app, 16);
         let stale = app.world.resource::<FrameStats>().noise;

@@ -6,23 +6,25 @@ use crate::bvh::Aabb;
 use crate::trace::emitter::Emitter;
 use glam::Vec3;
 use std::f32::consts::PI;
+use std::ops::Range;
 
 /// Cones up to this, in radians, are alike.
 const ALIKE: f32 = 0.5;
 /// Planes that are tried along each axis.
 const BINS: usize = 12;
 /// Of more emitters so many judge for all.
-const JUDGED: usize = 1024;
+const JUDGED: usize = 256;
+/// More than this are parted by several threads.
+const MANY: usize = 4096;
 /// From this depth on pairs are halves by number.
 const DEEP: u32 = 30;
 /// So no way down has more nodes: 2³² emitters are halved as often.
 pub(super) const DEEPEST: usize = DEEP as usize + 32;
 
-/// Emitters in two parts.
+/// Emitters in two parts, or as few as fit into one node.
 struct Pair {
     group: Group,
-    /// Number of the first part, which the second follows; 0 for a single emitter.
-    child: usize,
+    parts: Option<Box<[Pair; 2]>>,
 }
 
 impl LightTree {
@@ -34,10 +36,7 @@ impl LightTree {
             return tree;
         }
         let mut order: Vec<u32> = (0..emitters.len() as u32).collect();
-        let mut pairs = Vec::with_capacity(2 * emitters.len());
-        pairs.push(None);
-        part(&mut pairs, 0, emitters, &mut order, [0, 0]);
-        let pairs: Vec<Pair> = pairs.into_iter().flatten().collect();
+        let pair = part(emitters, &mut order, 0, 0);
         let mut sum = 0.0;
         tree.sums.push(sum);
         for (place, &emitter) in (0..).zip(&order) {
@@ -46,80 +45,105 @@ impl LightTree {
             tree.homes[emitter as usize].place = place;
         }
         tree.order = order;
-        tree.add(&pairs, 0, (0, 0));
+        tree.add(emitters, &pair, (0, 0));
         tree
     }
 
-    /// Adds a node of all that is below one of the `pairs`, and returns its number.
-    fn add(&mut self, pairs: &[Pair], top: usize, parent: (u32, u32)) -> u32 {
-        let mut members = vec![top];
+    /// Adds nodes of all that is in `pair`, and returns the number of the first.
+    fn add(&mut self, emitters: &[Emitter], Pair { group, parts }: &Pair, parent: (u32, u32)) -> u32 {
+        let Some(parts) = parts else { return self.add_each(emitters, group.places.clone(), parent) };
+        let mut members: Vec<&Pair> = parts.iter().collect();
         while members.len() < WIDTH {
             // What is most in need of being looked into.
-            let few = if pairs[top].group.places.len() > WIDTH { WIDTH } else { 1 };
-            let many =
-                members.iter().enumerate().filter(|&(_, &member)| pairs[member].group.places.len() > few);
-            let costs = many.map(|(i, &member)| (i, pairs[member].group.all.cost()));
-            let Some((i, _)) = costs.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-            let child = pairs[members[i]].child;
+            let costs = members.iter().enumerate().filter_map(|(i, member)| {
+                member.parts.as_ref().map(|parts| (i, parts, member.group.all.cost()))
+            });
+            let Some((i, parts, _)) = costs.max_by(|a, b| a.2.total_cmp(&b.2)) else { break };
             // In the order of their places: so numbers that are near each other mean emitters that are.
-            members.splice(i..=i, [child, child + 1]);
+            members.splice(i..=i, parts.iter());
         }
-        let groups: Vec<(&Group, f64)> = members
-            .iter()
-            .map(|&member| &pairs[member].group)
-            .map(|group| (group, self.intensity(group.places.start, group.places.len())))
-            .collect();
-        let number = self.nodes.len() as u32;
-        self.nodes.push(Node::new(&groups, parent));
-        for (child, &member) in (0..).zip(&members) {
-            if pairs[member].child > 0 {
-                let node = self.add(pairs, member, (number, child));
-                self.nodes[number as usize].children[child as usize].node = node;
-            } else {
-                let home = &mut self.homes[self.order[pairs[member].group.places.start] as usize];
+        let number = self.push(members.iter().map(|member| &member.group), parent);
+        for (child, member) in (0..).zip(members) {
+            if let [only] = self.order[member.group.places.clone()] {
+                let home = &mut self.homes[only as usize];
                 (home.node, home.child) = (number, child);
+            } else {
+                let node = self.add(emitters, member, (number, child));
+                self.nodes[number as usize].children[child as usize].node = node;
             }
         }
         number
     }
+
+    /// Adds a node of the emitters in these places.
+    fn add_each(&mut self, emitters: &[Emitter], places: Range<usize>, parent: (u32, u32)) -> u32 {
+        let alone = |place: usize| {
+            let all = emitters[self.order[place] as usize];
+            Group { all, alike: true, places: place..place + 1 }
+        };
+        let groups: Vec<Group> = places.clone().map(alone).collect();
+        let number = self.push(groups.iter(), parent);
+        for (child, place) in (0..).zip(places) {
+            let home = &mut self.homes[self.order[place] as usize];
+            (home.node, home.child) = (number, child);
+        }
+        number
+    }
+
+    fn push<'a>(&mut self, groups: impl Iterator<Item = &'a Group>, parent: (u32, u32)) -> u32 {
+        let groups: Vec<(&Group, f64)> = groups
+            .map(|group| (group, self.intensity(group.places.start, group.places.len())))
+            .collect();
+        self.nodes.push(Node::new(&groups, parent));
+        self.nodes.len() as u32 - 1
+    }
 }
 
-/// Makes pair number `at` of those of `order`, of which the first has this place among all; returns them together, and whether
-/// they are alike.
-fn part(
-    pairs: &mut Vec<Option<Pair>>,
-    at: usize,
-    emitters: &[Emitter],
-    order: &mut [u32],
-    [place, depth]: [usize; 2],
-) -> (Emitter, bool) {
+/// Parts those of `order`, of which the first has this `place` among all.
+fn part(emitters: &[Emitter], order: &mut [u32], place: usize, depth: u32) -> Pair {
     let places = place..place + order.len();
-    if let [only] = *order {
-        let all = emitters[only as usize];
-        pairs[at] = Some(Pair { group: Group { all, alike: true, places }, child: 0 });
-        return (all, true);
+    if order.len() <= WIDTH {
+        sort(emitters, order);
+        let each = order.iter().map(|&i| (emitters[i as usize], true));
+        let (all, alike) = each.reduce(together).unwrap_or_default();
+        return Pair { group: Group { all, alike, places }, parts: None };
     }
-    let middle = split(emitters, order, depth as u32);
-    let child = pairs.len();
-    pairs.extend([None, None]);
+    let middle = split(emitters, order, depth);
     let (left, right) = order.split_at_mut(middle);
-    let (first, first_alike) = part(pairs, child, emitters, left, [place, depth + 1]);
-    let (second, second_alike) = part(pairs, child + 1, emitters, right, [place + middle, depth + 1]);
+    let mut first = || part(emitters, left, place, depth + 1);
+    let mut second = || part(emitters, right, place + middle, depth + 1);
+    let parts = if places.len() > MANY { rayon::join(&mut first, &mut second) } else { (first(), second()) };
+    let of = |Pair { group: Group { all, alike, .. }, .. }: &Pair| (*all, *alike);
+    let (all, alike) = together(of(&parts.0), of(&parts.1));
+    Pair { group: Group { all, alike, places }, parts: Some(Box::new(parts.into())) }
+}
+
+/// Both, and whether they are alike; each of them may be many, alike or not.
+fn together((first, first_alike): (Emitter, bool), (second, second_alike): (Emitter, bool)) -> (Emitter, bool) {
     let all = first.union(&second);
     // Those of no common direction only if each of them shines to all sides.
     let is_one_way = |emitter: &Emitter| emitter.spread <= ALIKE;
     let is_every_way = |emitter: &Emitter| emitter.spread >= PI;
     let same = is_one_way(&all) || is_every_way(&first) && is_every_way(&second);
-    let alike = first_alike && second_alike && same && first.two_sided == second.two_sided;
-    pairs[at] = Some(Pair { group: Group { all, alike, places }, child });
-    (all, alike)
+    (all, first_alike && second_alike && same && first.two_sided == second.two_sided)
+}
+
+/// Those of a node, so that numbers that are near each other mean emitters that are.
+fn sort(emitters: &[Emitter], order: &mut [u32]) {
+    if order.len() <= 2 {
+        return;
+    }
+    let center = |i: u32| emitters[i as usize].bounds.center();
+    let bounds = order.iter().fold(Aabb::EMPTY, |bounds, &i| bounds.with(center(i)));
+    let axis = (bounds.max - bounds.min).max_position();
+    order.sort_by(|&a, &b| center(a)[axis].total_cmp(&center(b)[axis]));
+    let (left, right) = order.split_at_mut(order.len() / 2);
+    sort(emitters, left);
+    sort(emitters, right);
 }
 
 /// Sorts `order` into two parts, neither of which is empty; returns where the second begins.
 fn split(emitters: &[Emitter], order: &mut [u32], depth: u32) -> usize {
-    if order.len() <= 2 {
-        return 1;
-    }
     let center = |i: u32| emitters[i as usize].bounds.center();
     let bounds = order.iter().fold(Aabb::EMPTY, |bounds, &i| bounds.with(center(i)));
     let size = bounds.max - bounds.min;
@@ -155,8 +179,11 @@ fn split(emitters: &[Emitter], order: &mut [u32], depth: u32) -> usize {
     }
     match best {
         Some((_, axis, plane)) => {
-            order.sort_by_key(|&i| bin(&bounds, axis, center(i)) >= plane);
-            order.partition_point(|&i| bin(&bounds, axis, center(i)) < plane)
+            let is_left = |i: &u32| bin(&bounds, axis, center(*i)) < plane;
+            let (left, right): (Vec<u32>, Vec<u32>) = order.iter().partition(|&i| is_left(i));
+            order[..left.len()].copy_from_slice(&left);
+            order[left.len()..].copy_from_slice(&right);
+            left.len()
         }
         None => order.len() / 2,
     }

@@ -17,6 +17,9 @@ pub(super) struct Node {
     center: [Row; 3],
     radius: Row,
     inverse: Row,
+    /// Squared distance of the nearest, at least; and what they send at least, times that squared and a distance.
+    close: Row,
+    least: Row,
     /// [`crate::trace::emitter::Sides`], in parts of the intensity of all: squares without their weight.
     weight: Row,
     squares: [Row; 6],
@@ -72,6 +75,12 @@ pub(super) struct Group {
 const FAR: f32 = 6.0;
 /// What they are expected to bring does not know what is in between: so often their intensity and their number decide alike.
 const BLIND: f32 = 0.1;
+/// From within the ball of those that face all directions, the squared distance is at least this part of that of its radius, and
+/// what is sent is at least this part of the intensity, falling with the squared distance. Found for 3000 emitters around sixty points:
+/// second moment 10 with 1 and 0, 1.7 to 2.1 so; half or double of either has more. Those that face one direction send nothing along
+/// their plane: from inside of a ball that shines, where all of what is near does that, it is 1.06 so, and 1.37 if all have this.
+const CLOSE: f32 = 0.4;
+const ANYWHERE: f32 = 0.1;
 
 impl Node {
     /// Of these, with the intensity of each in all.
@@ -97,6 +106,9 @@ impl Node {
             for (row, square) in node.squares.iter_mut().zip(sides.squares) {
                 row[i] = part(square, sides.weight);
             }
+            let scattered = sides.scattered();
+            node.close[i] = radius * radius * (1.0 - scattered * (1.0 - CLOSE));
+            node.least[i] = share * scattered * ANYWHERE * radius.powi(3);
             for axis in 0..3 {
                 node.center[axis][i] = center[axis];
                 node.front[axis][i] = share * part(sides.front[axis], all.intensity);
@@ -162,9 +174,8 @@ impl Node {
             [self.center[0][i] - to.point.x, self.center[1][i] - to.point.y, self.center[2][i] - to.point.z];
         let distance2 = x * x + y * y + z * z;
         let radius = self.radius[i];
-        let radius2 = radius * radius;
         // From inside of the ball around them, they may be anywhere.
-        let inverse = 1.0 / distance2.max(radius2).max(1e-30);
+        let inverse = 1.0 / distance2.max(self.close[i]).max(1e-30);
         let [xx, yy, zz, yz, zx, xy] = &self.squares;
         let squares = x * (x * xx[i] + y * (2.0 * xy[i]))
             + y * (y * yy[i] + z * (2.0 * yz[i]))
@@ -179,7 +190,7 @@ impl Node {
         // Never quite dark: what shines through a surface arrives from behind, and rounding
         // must not decide.
         let arriving = mean.max(0.05 * height.abs());
-        let sending = sent.max(0.05 * self.share[i] * radius);
+        let sending = sent.max(0.05 * self.share[i] * radius) + self.least[i] * inverse;
         (height, sent, sending * arriving * inverse * inverse)
     }
 

@@ -157,13 +157,20 @@ fn say(world: &mut World, text: &str) {
     world.resource_mut::<Notices>().0.push(Notice::Text(text.to_owned()));
 }
 
+/// That something is to be selected first, if it still says so.
+fn wanted_no_more(world: &mut World) {
+    say(world, "");
+}
+
 fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
     let found = pick(world, cursor, editor.selected.is_some());
     editor.row = 0;
     // That was told of another.
     editor.redone.clear();
     editor.selected = if editor.selected == found { None } else { found };
-    if found.is_none() {
+    if found.is_some() {
+        wanted_no_more(world);
+    } else {
         say(world, "nothing there to edit: {next_thing} goes through all there is");
     }
 }
@@ -172,7 +179,9 @@ fn go(world: &mut World, editor: &mut Editor, by: i64) {
     editor.row = 0;
     editor.redone.clear();
     editor.selected = stepped(&things(world), editor.selected, by);
-    if editor.selected.is_none() {
+    if editor.selected.is_some() {
+        wanted_no_more(world);
+    } else {
         say(world, "there is nothing to edit");
     }
 }

@@ -131,14 +131,7 @@ fn write(world: &World, editor: &Editor) -> Result<(String, String), String> {
     let (text, place) = text(world, editor)?;
     let stem = origin.source.name();
     let here = Path::new(".");
-    let (path, why) = match numbered(&place.folder, &stem, &text) {
-        Ok(path) => (path, String::new()),
-        Err(why) if place.is_free && place.folder != here => {
-            let elsewhere = numbered(here, &stem, &text).map_err(|_| why.clone())?;
-            (elsewhere, format!(" where the program was started ({why})"))
-        }
-        Err(why) => return Err(why),
-    };
+    let (path, why) = there_or_here(&place, here, &stem, &text)?;
     let path = path.strip_prefix(".").unwrap_or(&path);
     // A path may be longer than the window is wide.
     let is_beside =
@@ -159,6 +152,18 @@ fn write(world: &World, editor: &Editor) -> Result<(String, String), String> {
     Ok((said, shell_line(&command)))
 }
 
+/// Writes `text` to a file in its place, or if it cannot be and does not have to be there, `here`; and why so.
+fn there_or_here(place: &Place, here: &Path, stem: &str, text: &str) -> Result<(PathBuf, String), String> {
+    match numbered(&place.folder, stem, text) {
+        Ok(path) => Ok((path, String::new())),
+        Err(why) if place.is_free && place.folder != here => {
+            let elsewhere = numbered(here, stem, text).map_err(|_| why.clone())?;
+            Ok((elsewhere, format!(" where the program was started ({why})")))
+        }
+        Err(why) => Err(why),
+    }
+}
+
 /// Writes `text` to the first file of that name whose number is free.
 fn numbered(folder: &Path, stem: &str, text: &str) -> Result<PathBuf, String> {
     for n in 1..u32::MAX {
@@ -171,4 +176,27 @@ fn numbered(folder: &Path, stem: &str, text: &str) -> Result<PathBuf, String> {
         }
     }
     Err("no number is left".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder that is gone stands for one that nobody may write to: root may write anywhere.
+    #[test]
+    fn edits_go_elsewhere_if_they_cannot_be_beside_the_scene() {
+        let here = std::env::temp_dir().join(format!("penumbra-save-{}", std::process::id()));
+        std::fs::create_dir_all(&here).unwrap();
+        let place = |folder: PathBuf, is_free| Place { folder, is_free };
+        let write = |place: &Place| there_or_here(place, &here, "a", "edits");
+        let (first, why) = write(&place(here.clone(), true)).unwrap();
+        assert_eq!((first, why.as_str()), (here.join("a.edits_1.toml"), ""));
+        let (second, why) = write(&place(here.join("gone"), true)).unwrap();
+        assert_eq!(second, here.join("a.edits_2.toml"));
+        assert!(why.contains("gone") && why.contains("where the program was started"), "{why}");
+        let files = |folder: &Path| std::fs::read_dir(folder).unwrap().count();
+        let refused = write(&place(here.join("gone"), false)).unwrap_err();
+        assert!(refused.contains("gone") && files(&here) == 2, "{refused}");
+        std::fs::remove_dir_all(&here).unwrap();
+    }
 }

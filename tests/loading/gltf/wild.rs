@@ -105,6 +105,19 @@ fn a_few_bytes_cannot_ask_for_more_memory_than_allowed() {
     }
 }
 
+/// Each of them is a lamp to choose: what that takes is asked for as well.
+#[test]
+fn many_instances_that_shine_take_more_memory() {
+    let instances = r#","extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":3}}}"#;
+    let zeros = r#""type":"VEC3"},{"componentType":5126,"count":30000,"type":"VEC3"}],"#;
+    let with_emission = |emission: &str| {
+        let materials = format!(r#","materials":[{{"emissiveFactor":[0,{emission},0]}}]"#);
+        gltf_triangle(instances, r#","material":0"#, &materials).replace(r#""type":"VEC3"}],"#, zeros)
+    };
+    assert!(within(24, &with_emission("0")).1.is_ok_and(|report| report.triangles == 30_000));
+    assert_says(&too_much(24, &with_emission("1")), "its 30000 triangles that shine");
+}
+
 #[test]
 fn a_file_of_version_1_is_called_so_although_its_lists_are_none() {
     let text = r#"{"asset":{"version":"1.0"},"nodes":{"a":{}},"meshes":{},"materials":{"b":{"c":[1,2]}}}"#;
