@@ -301,6 +301,14 @@ impl<'w> Sink<'w> {
         }
     }
 
+    /// Whether a surface shines of what was spawned after the first `before` entities: a material that nothing wears does not.
+    pub(super) fn shines(&self, before: usize) -> bool {
+        let instances =
+            self.spawned[before..].iter().filter_map(|&entity| self.world.get::<Instance>(entity));
+        let mut lamps = instances.map(|instance| self.lamps(instance));
+        lamps.any(|lamps| lamps > 0)
+    }
+
     /// Asks for the memory of all that shines: each triangle of each instance is a lamp to choose.
     ///
     /// # Errors

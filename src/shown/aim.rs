@@ -21,6 +21,8 @@ pub struct Old<'a> {
     pub sheet: Sheet,
     pub cells: &'a [Vec4],
     pub spots: &'a [Spot],
+    /// Cells are of the middles of pixels alone, so that those of outlines are of one surface.
+    pub is_sharp: bool,
 }
 
 /// Rays of the new picture as linear functions of the place, in render space and in the old camera's own: the value at
@@ -129,16 +131,19 @@ impl Aims {
         Vec3::new(self.points[0][i], self.points[1][i], self.points[2][i])
     }
 
-    /// The old pixels that show what the first `count` of these show if it is of the surface of `place`.
+    /// The old pixels that show what the first `count` of these show if it is of the surface of `place`. Only at an edge it may have
+    /// been at an edge.
     #[inline(always)]
-    pub fn find(&self, new: &Sheet, old: &Old, place: &Place, count: usize) -> Finds {
+    pub fn find(&self, new: &Sheet, old: &Old, place: &Place, count: usize, edge: bool) -> Finds {
         let none = [f32::INFINITY; RUN];
         let mut finds = Finds { index: [0; RUN], away: none, off: [none; 2], square: none };
         // Parallel rays see one point of what is infinitely far.
         if place.thing == Place::NOTHING && !(new.perspective && old.sheet.perspective) {
             return finds;
         }
-        self.look(&self.at, new, old, place, &mut finds);
+        let most = if old.is_sharp || edge { u8::MAX } else { !Spot::OUTLINE };
+        let wanted = (place, u32::from(most));
+        self.look(&self.at, new, old, wanted, &mut finds);
         let (mut is_beside, mut is_lost) = (false, false);
         for i in 0..count {
             is_beside |= finds.away[i] > 1.25 * self.near[i];
@@ -153,21 +158,28 @@ impl Aims {
                     *at += if off.abs() > 0.5 { step } else { 0.0 };
                 }
             }
-            self.look(&beside, new, old, place, &mut finds);
+            self.look(&beside, new, old, wanted, &mut finds);
             // The others, if there was another surface.
             for [x, y] in if is_lost { OTHERS } else { &[] } {
                 let mut at = self.at;
                 at[0].iter_mut().for_each(|at| *at += x);
                 at[1].iter_mut().for_each(|at| *at += y);
-                self.look(&at, new, old, place, &mut finds);
+                self.look(&at, new, old, wanted, &mut finds);
             }
         }
         finds
     }
 
-    /// Takes the old pixels at `at` where they are better than what was found so far.
+    /// Takes the old pixels at `at` where they are better than what was found so far, if their [`Spot::keeps`] are at most so many.
     #[inline(always)]
-    fn look(&self, at: &[[f32; RUN]; 2], new: &Sheet, old: &Old, place: &Place, finds: &mut Finds) {
+    fn look(
+        &self,
+        at: &[[f32; RUN]; 2],
+        new: &Sheet,
+        old: &Old,
+        (place, most): (&Place, u32),
+        finds: &mut Finds,
+    ) {
         let [width, height] = old.size.as_vec2().to_array();
         let (mut index, mut is_it) = ([0_u32; RUN], [false; RUN]);
         for i in 0..RUN {
@@ -193,7 +205,8 @@ impl Aims {
             }
         }
         for i in 0..RUN {
-            is_it[i] &= words[i] >> 24 > 0;
+            let keeps = words[i] >> 24;
+            is_it[i] &= (keeps & u32::from(!Spot::OUTLINE) > 0) & (keeps <= most);
         }
         if place.thing == Place::NOTHING {
             for i in 0..RUN {
@@ -255,9 +268,9 @@ mod tests {
         let place = Place { position, facet: Vec3::Z, thing: 3, keeps: 64, ..Place::unknown() };
         let mut spots = vec![Spot::UNKNOWN; 256];
         spots[(y * 16 + x) as usize] = Spot::from(&place);
-        let old = Old { size, sheet, cells: &[Vec4::ONE; 256], spots: &spots };
+        let old = Old { size, sheet, cells: &[Vec4::ONE; 256], spots: &spots, is_sharp: false };
         let ways = Ways::new(&new, &old.sheet);
-        let finds = ways.aim(&new, &old.sheet, [[middle; RUN]; 2], &place).find(&new, &old, &place, 1);
+        let finds = ways.aim(&new, &old.sheet, [[middle; RUN]; 2], &place).find(&new, &old, &place, 1, false);
         (finds.index[0], finds.away[0])
     }
 

@@ -42,12 +42,15 @@ impl Shown {
         let new = scene.viewpoint.sheet(size);
         let grid = Grid::new(scene, &new, preview, &mut self.pace, seconds);
         let start = Instant::now();
-        if std::mem::take(&mut self.is_kept) {
+        // Samples of the film are from anywhere in their pixels.
+        let is_sharp = std::mem::take(&mut self.is_kept);
+        if is_sharp {
             std::mem::swap(&mut self.cells, &mut self.kept);
         }
         self.kept.resize(count, Vec4::ZERO);
         self.spare.resize(count, Spot::UNKNOWN);
-        let old = Old { size, sheet: before.sheet(size), cells: &self.cells, spots: &self.spots };
+        let (cells, spots) = (&*self.cells, &*self.spots);
+        let old = Old { size, sheet: before.sheet(size), cells, spots, is_sharp };
         let (mut kept, mut found) = (&mut *self.kept, &mut *self.spare);
         let mut bands = Vec::with_capacity(grid.size.y as usize);
         for v in 0..grid.size.y {
@@ -61,10 +64,11 @@ impl Shown {
         let ways = Ways::new(&new, &old.sheet);
         let phase = self.fills % SPARSE;
         let carry = Carry { scene, new: &new, old: &old, grid: &grid, ways: &ways, phase };
-        let lost: Vec<_> = bands.into_par_iter().map(|band| carry.band(band)).collect();
+        let mut lost: Vec<_> = bands.into_par_iter().map(|band| carry.band(band)).collect();
+        std::mem::swap(&mut self.spots, &mut self.spare);
+        lost.push(self.mark_outlines(&grid, &new));
         let missing: usize = lost.iter().map(|lost| lost.missing.len()).sum();
         self.share = (count - missing) as f64 / count as f64;
-        std::mem::swap(&mut self.spots, &mut self.spare);
         self.exact_rows = 0;
         let looks: usize = lost.iter().map(|lost| lost.looks).sum();
         let looked = looks as f64 * self.pace.place.unwrap_or(0.0);
@@ -73,6 +77,42 @@ impl Shown {
         if preview.is_some() {
             self.fill(scene, &lost, grid.worth, FILLING * seconds);
         }
+    }
+
+    /// Marks spots beside those of other surfaces, and returns those that lost what they had: it was of such a one.
+    fn mark_outlines(&mut self, grid: &Grid, sheet: &Sheet) -> Lost {
+        let [width, height] = self.size.to_array();
+        let spots = &self.spots;
+        let outlines = |v: u32| {
+            let edges = (0..grid.size.x).filter(move |&u| grid.at(u, v).edge);
+            let columns = edges.flat_map(move |u| grid.columns(u, width));
+            let pixels = columns.flat_map(move |x| grid.rows(v, height).map(move |y| (x, y)));
+            let at = move |x: u32, y: u32| (y * width + x) as usize;
+            let is_outline = move |x: u32, y: u32| {
+                let here = &spots[at(x, y)];
+                let pixel = sheet.pixel(sheet.own(here.position).z.max(0.0));
+                let differs = |x: u32, y: u32| !here.continues(&spots[at(x, y)], pixel);
+                x > 0 && differs(x - 1, y)
+                    || x + 1 < width && differs(x + 1, y)
+                    || y > 0 && differs(x, y - 1)
+                    || y + 1 < height && differs(x, y + 1)
+            };
+            let marked = move |(x, y)| (x, y, is_outline(x, y));
+            pixels.map(marked).filter(move |&(x, y, now)| now || spots[at(x, y)].is_outline())
+        };
+        let found: Vec<(u32, u32, bool)> = (0..grid.size.y).into_par_iter().flat_map_iter(outlines).collect();
+        let mut lost = Lost::default();
+        for (x, y, is_outline) in found {
+            let at = (y * width + x) as usize;
+            self.spots[at] = self.spots[at].unmarked();
+            if is_outline {
+                self.spots[at].keeps |= Spot::OUTLINE;
+            } else {
+                self.kept[at].w = 0.0;
+                lost.missing.push(UVec2::new(x, y));
+            }
+        }
+        lost
     }
 }
 
@@ -135,7 +175,7 @@ impl Job for CarryBand<'_> {
             let Run { place, edge, ref columns, ref rows } = run;
             let surface = Spot::from(&Place { edge: false, ..place });
             let aims = ways.aim(new, &old.sheet, run.middles(), &place);
-            let finds = aims.find(new, old, &place, columns.len() * rows.len());
+            let finds = aims.find(new, old, &place, columns.len() * rows.len(), edge);
             let mut i = 0;
             for y in rows.clone() {
                 let first = ((y - band.start) * old.size.x) as usize;
@@ -144,7 +184,7 @@ impl Job for CarryBand<'_> {
                 for (x, (kept, found)) in columns.clone().zip(pixels) {
                     let there = &old.spots[finds.index[i % RUN] as usize];
                     let cell = old.cells[finds.index[i % RUN] as usize];
-                    let keeps = f32::from(place.keeps.min(there.keeps));
+                    let keeps = f32::from(place.keeps.min(there.unmarked().keeps));
                     let spread = aims.spread[i % RUN];
                     let weight = cell.w.min(MOST).min(keeps) * spread * spread;
                     let (away, near) = (finds.away[i % RUN], aims.near[i % RUN]);
@@ -159,7 +199,7 @@ impl Job for CarryBand<'_> {
                             let radiance = (cell.truncate() * weight + preview * grid.worth) / sum;
                             radiance.extend(sum.min(MOST))
                         };
-                        *found = *there;
+                        *found = if old.is_sharp { there.unmarked() } else { *there };
                         if away > near {
                             found.position = aims.point(i % RUN);
                         }
@@ -171,8 +211,7 @@ impl Job for CarryBand<'_> {
                         let is_there = depth > 0.0 && depth.is_finite() && place.thing != Place::NOTHING;
                         let (position, depth) =
                             if is_there { (aims.point(i % RUN), depth) } else { (place.position, 1.0) };
-                        let color = grid.color([x, y], old.size, &place, new.pixel(depth));
-                        *kept = color.extend(grid.worth);
+                        *kept = grid.color([x, y], old.size, &place, new.pixel(depth));
                         *found = Spot { position, ..surface };
                         lost.missing.push(UVec2::new(x, y));
                     }

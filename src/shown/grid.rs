@@ -3,7 +3,7 @@
 use crate::trace::camera::Sheet;
 use crate::trace::place::{Place, places};
 use crate::trace::{Film, TraceScene};
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Instant;
@@ -30,6 +30,8 @@ pub struct Pace {
     pub sample: Option<f64>,
 }
 
+/// What the preview of another surface counts: less than what is found again in the next step.
+const NOTHING: f32 = 1e-3;
 /// Before anything was measured: seconds for a pixel or a place.
 const FIRST_GUESS: f64 = 2e-8;
 
@@ -137,24 +139,27 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// What the preview shows at pixel (x, y) of a picture of `full` pixels, or beside it, of the surface at `place`.
-    pub fn color(&self, [x, y]: [u32; 2], full: UVec2, place: &Place, pixel: f32) -> Vec3 {
-        let Some(film) = self.preview else { return Vec3::ZERO };
+    /// What the preview shows at pixel (x, y) of a picture of `full` pixels, or beside it, of the surface at `place`, and what that
+    /// counts: nearly nothing if it shows another.
+    pub fn color(&self, [x, y]: [u32; 2], full: UVec2, place: &Place, pixel: f32) -> Vec4 {
+        let Some(film) = self.preview else { return Vec4::ZERO };
         let small = film.size();
         let (u, v) = (x * small.x / full.x, y * small.y / full.y);
-        let color = |u: u32, v: u32| film.pixel(u, v).mean().as_vec3();
+        let color = |u: u32, v: u32, worth: f32| film.pixel(u, v).mean().as_vec3().extend(worth);
         let is_it = |u: u32, v: u32| {
             let middle = |i: u32, small: u32, blocks: u32| (2 * i + 1) * blocks / (2 * small);
             let block = self.at(middle(u, small.x, self.size.x), middle(v, small.y, self.size.y));
             place.continues(block, 8.0 * pixel)
         };
         if is_it(u, v) {
-            return color(u, v);
+            return color(u, v, self.worth);
         }
         let rows = v.saturating_sub(1)..(v + 2).min(small.y);
         let columns = u.saturating_sub(1)..(u + 2).min(small.x);
         let mut around = rows.flat_map(|v| columns.clone().map(move |u| (u, v)));
-        let (u, v) = around.find(|&(u, v)| is_it(u, v)).unwrap_or((u, v));
-        color(u, v)
+        match around.find(|&(u, v)| is_it(u, v)) {
+            Some((u, v)) => color(u, v, self.worth),
+            None => color(u, v, self.worth.min(NOTHING)),
+        }
     }
 }

@@ -204,6 +204,8 @@ pub(super) struct LookOut<'a> {
     pub size: UVec2,
     pub samplers: &'a SamplerRow<LANES>,
     pub corners: [&'a Row; 2],
+    /// Through the middles of the pixels, not anywhere in them.
+    pub middles: bool,
     /// What comes out; no more than a row.
     pub rays: &'a mut [Ray],
 }
@@ -214,7 +216,11 @@ impl Job for LookOut<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        self.samplers.pairs(0, &mut x, &mut y);
+        if self.middles {
+            (x, y) = ([0.5; LANES], [0.5; LANES]);
+        } else {
+            self.samplers.pairs(0, &mut x, &mut y);
+        }
         let (mut lens_x, mut lens_y) = ([0.0; LANES], [0.0; LANES]);
         let has_lens = self.viewpoint.has_lens();
         if has_lens {

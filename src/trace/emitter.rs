@@ -195,7 +195,9 @@ mod tests {
         let all = [Vec3::X, Vec3::NEG_Y, Vec3::Z].map(flat);
         let scattered = |emitter: Emitter| emitter.sides.scattered();
         let near = |value: f32, exact: f32| (value - exact).abs() < 1e-6;
-        assert!(near(scattered(all[0]), 0.0) && near(scattered(flat(Vec3::X).union(&flat(Vec3::NEG_X))), 0.0));
+        assert!(
+            near(scattered(all[0]), 0.0) && near(scattered(flat(Vec3::X).union(&flat(Vec3::NEG_X))), 0.0)
+        );
         assert!(near(scattered(all[0].union(&all[1])), 0.75));
         assert!(near(scattered(all[0].union(&all[1]).union(&all[2])), 1.0));
         assert!(near(scattered(Emitter::all_round(Aabb::EMPTY, 3.0)), 1.0));

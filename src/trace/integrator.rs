@@ -121,7 +121,7 @@ impl Batch {
     /// Adds the samples that [`Batch::begin`] has noted, of a picture of `size`.
     pub fn render(&mut self, scene: &TraceScene, tile: &mut Tile, size: UVec2, rays: &mut RayCounts) {
         self.diffuse.enter(scene, tile, size);
-        self.follow(scene, size, rays);
+        self.follow(scene, size, false, rays);
         self.diffuse.leave(tile);
         let mut dropped = 0;
         let mut done = 0;
@@ -148,11 +148,11 @@ impl Batch {
         }
     }
 
-    /// Finds the radiance of all samples in `keys`.
-    pub(super) fn follow(&mut self, scene: &TraceScene, size: UVec2, rays: &mut RayCounts) {
+    /// Finds the radiance of all samples in `keys`, anywhere in their pixels or in their `middles`.
+    pub(super) fn follow(&mut self, scene: &TraceScene, size: UVec2, middles: bool, rays: &mut RayCounts) {
         // What others have looked up in this thread is not ours.
         let _ = features::take();
-        self.look(scene, size);
+        self.look(scene, size, middles);
         self.radiance.clear();
         // What is shared comes after what is each one's own.
         let banks = if self.reuse.on { 2 } else { 1 };
@@ -170,8 +170,8 @@ impl Batch {
         rays.features = rays.features + features::take();
     }
 
-    /// Makes the camera rays.
-    fn look(&mut self, scene: &TraceScene, size: UVec2) {
+    /// Makes the camera rays, anywhere in their pixels or through their `middles`.
+    fn look(&mut self, scene: &TraceScene, size: UVec2, middles: bool) {
         self.rays.clear();
         self.rays.resize(self.keys.len(), Ray::new(Vec3::ZERO, Vec3::Z));
         for (keys, rays) in self.keys.chunks(LANES).zip(self.rays.chunks_mut(LANES)) {
@@ -183,7 +183,14 @@ impl Batch {
                 samplers.set(i, &halves[sample as usize & 1].at(sample));
             }
             let (viewpoint, samplers) = (scene.viewpoint, &samplers);
-            scene.geometry.tlas.isa().run(LookOut { viewpoint, size, samplers, corners: [&x, &y], rays });
+            scene.geometry.tlas.isa().run(LookOut {
+                viewpoint,
+                size,
+                samplers,
+                corners: [&x, &y],
+                middles,
+                rays,
+            });
         }
     }
 

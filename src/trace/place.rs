@@ -37,13 +37,39 @@ pub struct Spot {
     pub thing: u32,
     /// Unit geometric normal, times 127.
     pub facet: [i8; 3],
-    /// See [`Place::keeps`]; 0 also where a pixel shows several surfaces.
+    /// See [`Place::keeps`]; 0 also where a pixel shows several surfaces. With [`Spot::OUTLINE`] only its middle is of this one.
     pub keeps: u8,
 }
 
 impl Spot {
     /// Not looked at yet.
     pub const UNKNOWN: Self = Self { position: Vec3::ZERO, thing: Place::UNKNOWN, facet: [0; 3], keeps: 0 };
+    /// Marks [`Spot::keeps`] of a pixel beside one of another surface.
+    pub const OUTLINE: u8 = 0x80;
+
+    /// The same without [`Spot::OUTLINE`].
+    #[inline(always)]
+    #[must_use]
+    pub fn unmarked(&self) -> Self {
+        Self { keeps: self.keeps & !Self::OUTLINE, ..*self }
+    }
+
+    /// Whether [`Spot::OUTLINE`] is set.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_outline(&self) -> bool {
+        self.keeps & Self::OUTLINE > 0
+    }
+
+    /// Whether `other`, seen in a pixel of this side beside it, is of the same smooth surface.
+    #[inline(always)]
+    #[must_use]
+    pub fn continues(&self, other: &Self, pixel: f32) -> bool {
+        let [a, b] = [self, other].map(|spot| Vec3::from_array(spot.facet.map(f32::from)) / 127.0);
+        self.thing == other.thing
+            && (self.thing == Place::NOTHING
+                || a.dot(b) > 0.9 && a.dot(other.position - self.position).abs() <= 2.0 * pixel)
+    }
 }
 
 impl From<&Place> for Spot {

@@ -7,7 +7,8 @@ use super::{RenderSettings, TraceScene};
 use glam::{UVec2, Vec3};
 
 impl Batch {
-    /// Radiance of sample number `index` of each of `pixels`, in their order.
+    /// Radiance of sample number `index` of each of `pixels`, in their order, all in the middle of their pixel: of the surface that
+    /// [`super::place::places`] finds there.
     pub fn single_samples(&mut self, scene: &TraceScene, pixels: &[UVec2], index: u32) -> &[Vec3] {
         // Neighbours that share have whole tiles, and for a single sample nobody asks what is in the way of others.
         let settings = RenderSettings { reuse: false, ..scene.settings.for_single_samples() };
@@ -19,7 +20,7 @@ impl Batch {
         self.pixels.extend(pixels.iter().map(halves));
         self.reuse.enter(scene, UVec2::ONE);
         self.diffuse.enter_alone();
-        self.follow(scene, settings.size, &mut RayCounts::default());
+        self.follow(scene, settings.size, true, &mut RayCounts::default());
         &self.radiance
     }
 }

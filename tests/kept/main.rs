@@ -4,7 +4,7 @@
 mod flight;
 
 use bevy_ecs::prelude::*;
-use flight::{HEAD, flights, fly, moving, rest, row, step, watched};
+use flight::{HEAD, flights, fly, moving, rest, row, step, step_aside, watched};
 use glam::{UVec2, Vec3};
 use penumbra::app::App;
 use penumbra::image::Picture;
@@ -93,6 +93,46 @@ fn what_comes_into_view_gets_samples_of_its_own() {
     }
     println!("squared error {of_shown:.2e}, of the preview alone {of_preview:.2e}");
     assert!(of_shown < 0.5 * of_preview);
+}
+
+/// What shows two surfaces is of neither: carried along with one of them it would leave a trail of the other's colour.
+#[test]
+fn outlines_leave_no_trail() {
+    let size = UVec2::new(480, 270);
+    // As bright as it looks.
+    let seen = |image: &LinearImage, x: u32, y: u32| {
+        let color = image.pixels[(y * size.x + x) as usize];
+        color.clamp(Vec3::ZERO, Vec3::ONE).map(f32::sqrt)
+    };
+    let plain = |image: &LinearImage, x: u32, y: u32| {
+        let color = |x: u32, y: u32| seen(image, x, y);
+        let here = color(x, y);
+        let mut around = (y - 3..=y + 3).flat_map(|y| (x - 3..=x + 3).map(move |x| (x, y)));
+        around.all(|(x, y)| (color(x, y) - here).abs().max_element() < 0.03)
+    };
+    for scale in [8, 1] {
+        let mut app = watched("cornell", Integrator::Direct, size);
+        app.world.resource_mut::<Shown>().never_smooth = true;
+        app.world.insert_resource(Preview::at_scale(scale));
+        rest(&mut app, 32);
+        for _ in 0..8 {
+            step_aside(&mut app, 0.02);
+            moving(&mut app, Duration::ZERO);
+        }
+        let truth = LinearImage::of(&app.probe(size, 32));
+        let shown = app.world.resource::<Shown>().image();
+        let inside = (3..size.y - 3).flat_map(|y| (3..size.x - 3).map(move |x| (x, y)));
+        let clear: Vec<(u32, u32)> = inside.filter(|&(x, y)| plain(&truth, x, y)).collect();
+        let off = |x: u32, y: u32| (seen(&shown, x, y) - seen(&truth, x, y)).abs().max_element();
+        let wrong = clear.iter().filter(|&&(x, y)| off(x, y) > 0.1);
+        let share = wrong.count() as f64 / clear.len() as f64;
+        println!(
+            "previews of 1/{scale}: {:.3} % of {} pixels are of something else",
+            100.0 * share,
+            clear.len()
+        );
+        assert!(share < 1e-4, "{share}");
+    }
 }
 
 #[test]

@@ -204,6 +204,55 @@ fn units_of_lights_are_seen_from_the_file_or_said() {
     assert!((shown(&text, &told(LightUnits::Candela)).0 / watts - 1.0).abs() < 1e-5);
 }
 
+/// What shines beside lamps says what their numbers mean; what is dark in the picture does not.
+#[test]
+fn what_does_not_shine_says_nothing_of_lamps() {
+    let light = r#","extensions":{"KHR_lights_punctual":{"light":0}}"#;
+    let shown = |material: &str, scenes: &str| {
+        let more = format!(
+            r#","extensionsUsed":["KHR_lights_punctual"],"extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":683}}]}}}},
+            "textures":[{{"source":0}}],"images":[{{"uri":"black.png"}}],"materials":[{{"emissiveFactor":[1,0,0]{material}}}]"#
+        );
+        let text = gltf_triangle("", r#","material":0"#, &more)
+            .replace(
+                r#""nodes":[{"mesh":0}],"#,
+                &format!(r#""nodes":[{{"mesh":0}},{{"name":"lamp"{light}}}],"#),
+            )
+            .replace(r#"{"nodes":[0]}"#, scenes);
+        let (mut world, _) = loaded_all(&[("a.gltf", text.as_bytes()), ("black.png", &png([0, 0, 0, 255]))]);
+        let Some(Light::Point { intensity }) = lights(&mut world).first().cloned() else { panic!("no lamp") };
+        intensity.x
+    };
+    let both = r#"{"nodes":[0,1]}"#;
+    assert_eq!(shown("", both), 683.0);
+    for dark in [
+        r#","extensions":{"KHR_materials_unlit":{}}"#,
+        r#","extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":0}}"#,
+        r#","emissiveTexture":{"index":0}"#,
+    ] {
+        assert_eq!(shown(dark, both), 1.0, "{dark}");
+    }
+    assert_eq!(shown("", r#"{"nodes":[1]},{"nodes":[0]}"#), 1.0, "in another scene");
+}
+
+/// The format's own material is white, and colours of vertices are factors of that; we show grey only where there is no colour.
+#[test]
+fn colours_of_vertices_without_a_material_are_as_they_are() {
+    let colored = gltf_triangle("", "", "").replace(r#""TEXCOORD_0":1"#, r#""TEXCOORD_0":1,"COLOR_0":2"#);
+    let object = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
+    for (name, text, color) in [
+        ("a.gltf", colored.as_str(), 1.0),
+        ("a.gltf", &gltf_triangle("", "", ""), 0.8),
+        ("a.obj", object, 1.0),
+        ("a.obj", &object.replace("f ", "usemtl gone\nf "), 1.0),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 0.8),
+    ] {
+        let (mut world, _) = loaded(name, text);
+        let material = world.query::<&Material>().single(&world).unwrap();
+        assert_eq!(material.base_color, Vec3::splat(color), "{name} {text}");
+    }
+}
+
 #[test]
 fn what_is_made_from_the_shape_itself_is_told() {
     let volume = r#""KHR_materials_volume":{"thicknessFactor":1,"thicknessTexture":{"index":0}}"#;

@@ -21,8 +21,8 @@ use std::collections::HashMap;
 pub(super) struct Palette {
     /// By index in the file.
     pub(super) materials: Vec<Entity>,
-    /// For primitives that name none.
-    default: Option<Entity>,
+    /// For primitives that name none: without colours of their own, and with.
+    default: [Option<Entity>; 2],
     /// Which `TEXCOORD_n` each material wants as first and as second set.
     pub(super) uv_sets: Vec<[u32; 2]>,
     /// Which of them have textures.
@@ -30,11 +30,16 @@ pub(super) struct Palette {
 }
 
 impl Palette {
-    /// The material for primitives without one, spawned when it is first needed.
-    pub(super) fn default_material(&mut self, file: &str, sink: &mut Sink<'_>) -> Entity {
-        *self.default.get_or_insert_with(|| {
+    /// The material for primitives without one, spawned when it is first needed: what has colours at its vertices has just these.
+    pub(super) fn default_material(&mut self, file: &str, has_colors: bool, sink: &mut Sink<'_>) -> Entity {
+        *self.default[usize::from(has_colors)].get_or_insert_with(|| {
+            let grey = Material { culled: true, ..Material::default() };
+            if has_colors {
+                let white = Material { base_color: Vec3::ONE, ..grey };
+                return sink.spawn((Name::new("default, coloured"), white));
+            }
             sink.decide(file, "surfaces without a material are light grey");
-            sink.spawn((Name::new("default"), Material { culled: true, ..Material::default() }))
+            sink.spawn((Name::new("default"), grey))
         })
     }
 }
@@ -48,11 +53,11 @@ pub(super) fn spawn_all(
     if let Some(all) = overrides.all {
         let count = document.root.materials.len();
         let (materials, uv_sets) = (vec![all; count], vec![[0; 2]; count]);
-        return Ok(Palette { materials, default: Some(all), uv_sets, textured: vec![false; count] });
+        return Ok(Palette { materials, default: [Some(all); 2], uv_sets, textured: vec![false; count] });
     }
     let mut textures = Textures::new(document, sink)?;
     let mut palette =
-        Palette { materials: Vec::new(), default: None, uv_sets: Vec::new(), textured: Vec::new() };
+        Palette { materials: Vec::new(), default: [None; 2], uv_sets: Vec::new(), textured: Vec::new() };
     let mut named: HashMap<&str, usize> = HashMap::new();
     for name in document.root.materials.iter().filter_map(|material| material.name.as_deref()) {
         *named.entry(name).or_default() += 1;
@@ -152,7 +157,8 @@ fn convert(
         (roughness, roughness_texture) = (rough, texture);
     }
     let strength = extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength.0);
-    let emission = if unlit { Vec3::ZERO } else { Vec3::from(material.emissive_factor.0) * strength };
+    let is_dark = unlit || material.emissive_texture.as_ref().is_some_and(|info| textures.is_black(info));
+    let emission = if is_dark { Vec3::ZERO } else { Vec3::from(material.emissive_factor.0) * strength };
     let passes_light = layers.as_ref().is_some_and(|layers| layers.transmission.is_some());
     if layers.as_ref().and_then(|layers| layers.transmission.as_ref()).is_some_and(|t| t.body.is_none()) {
         let what =

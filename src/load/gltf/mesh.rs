@@ -62,7 +62,11 @@ impl Meshes {
             let worn = document.material_of(primitive);
             let material = match worn {
                 Some(index) => *document.at(&palette.materials, &Index::new(index), "material", &place)?,
-                None => palette.default_material(document.file, sink),
+                None => {
+                    let colors = Checked::Valid(Semantic::Colors(0));
+                    let has_colors = primitive.attributes.contains_key(&colors);
+                    palette.default_material(document.file, has_colors, sink)
+                }
             };
             let uv_sets = worn.map_or([0; 2], |index| palette.uv_sets[index as usize]);
             if worn.is_some_and(|index| palette.textured[index as usize]) {

@@ -35,7 +35,7 @@ pub(super) fn spawn_scene(
     let mut flat: Vec<bool> = local.iter().map(|local| local.matrix3.determinant() == 0.0).collect();
     order.iter().for_each(|&i| flat[i] |= parents[i].is_some_and(|parent| flat[parent]));
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
-    let light_units = units::of(document, sink);
+    let before = sink.spawned().len();
     let mut meshes = Meshes::default();
     if nodes.iter().all(|node| node.mesh.is_none()) && !document.root.meshes.is_empty() {
         sink.decide(document.file, "no node shows a mesh: each is shown once");
@@ -54,9 +54,6 @@ pub(super) fn spawn_scene(
         entities[i] = Some(entity);
         if hidden[i] {
             continue;
-        }
-        if let Some(light) = light::light_of(document, node, light_units, &user, sink)? {
-            sink.world.entity_mut(entity).insert(light);
         }
         if let Some((name, camera, aspect)) = light::camera_of(document, node, &user, sink)? {
             sink.world.entity_mut(entity).insert(camera);
@@ -93,6 +90,14 @@ pub(super) fn spawn_scene(
         match holder {
             Some(holder) => instantiate(&built, holder, sink),
             None => place(document, node, entity, &built, &user, sink)?,
+        }
+    }
+    // What lamps mean depends on what shines beside them.
+    let light_units = units::of(document, before, sink);
+    for &i in &order {
+        let (Some(entity), false) = (entities[i], hidden[i]) else { continue };
+        if let Some(light) = light::light_of(document, &nodes[i], light_units, &format!("node {i}"), sink)? {
+            sink.world.entity_mut(entity).insert(light);
         }
     }
     // A mesh that says nothing of its place is left out of others, but is no scene.

@@ -71,6 +71,8 @@ pub(super) struct Textures<'a> {
     spawned: BTreeMap<(usize, bool), Entity>,
     /// By texture and factor: what [`Textures::made`] made.
     made: BTreeMap<(usize, u32), Entity>,
+    /// Images that have been asked whether they are black.
+    black: BTreeMap<usize, bool>,
 }
 
 impl<'a> Textures<'a> {
@@ -96,7 +98,7 @@ impl<'a> Textures<'a> {
         let texels: Vec<_> =
             decoded.map(|done| done.map_or_else(picture::stand_in, |done| done.texels)).collect();
         let images = indices.into_iter().zip(texels).collect();
-        Ok(Self { document, images, spawned: BTreeMap::new(), made: BTreeMap::new() })
+        Ok(Self { document, images, spawned: BTreeMap::new(), made: BTreeMap::new(), black: BTreeMap::new() })
     }
 
     /// The texture of `used` by a mesh whose sets of texture coordinates are `sets`.
@@ -125,6 +127,15 @@ impl<'a> Textures<'a> {
 }
 
 impl Textures<'_> {
+    /// Whether a texture has no colour anywhere.
+    pub(super) fn is_black(&mut self, info: &Info) -> bool {
+        let texture = self.document.root.textures.get(info.index.value());
+        let Some(image) = texture.and_then(source_of) else { return false };
+        let Some(texels) = self.images.get(&image) else { return false };
+        let is_black = || texels.texels.iter().all(|texel| texel[..3] == [0; 3]);
+        *self.black.entry(image).or_insert_with(is_black)
+    }
+
     /// A texture whose texels are made from those of `info` and a factor, as data; materials that agree share it.
     pub(super) fn made(
         &mut self,

@@ -45,8 +45,9 @@ fn is_directional(light: &Light) -> bool {
     light.type_ == Checked::Valid(Type::Directional)
 }
 
-/// What the user says, else what the file lets one see; the decision is told.
-pub(super) fn of(document: &Document<'_>, sink: &mut Sink<'_>) -> LightUnits {
+/// What the user says, else what the file lets one see, of which all after the first `before` entities has been spawned; the
+/// decision is told.
+pub(super) fn of(document: &Document<'_>, before: usize, sink: &mut Sink<'_>) -> LightUnits {
     let root = &document.root;
     let extension = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
     let lights: Vec<&Light> = extension.iter().flat_map(|extension| &extension.lights).collect();
@@ -77,7 +78,7 @@ pub(super) fn of(document: &Document<'_>, sink: &mut Sink<'_>) -> LightUnits {
                 "punctual lights are taken for Blender's \"Raw\", W and W/m², as their numbers show",
             ),
         }
-    } else if has_shining_surfaces(root) {
+    } else if sink.shines(before) {
         // Blender leaves W/(sr m²) as they are; for all others candela and cd/m² are of one measure.
         (
             LightUnits::Watts,
@@ -88,13 +89,6 @@ pub(super) fn of(document: &Document<'_>, sink: &mut Sink<'_>) -> LightUnits {
     };
     sink.decide(document.file, format!("{what} (--light-units)"));
     units
-}
-
-/// Whether a mesh has a material that shines: one that nothing is made of says nothing.
-fn has_shining_surfaces(root: &gltf::json::Root) -> bool {
-    let of_meshes = root.meshes.iter().flat_map(|mesh| &mesh.primitives).filter_map(|part| part.material);
-    let mut materials = of_meshes.filter_map(|index| root.materials.get(index.value()));
-    materials.any(|material| material.emissive_factor.0 != [0.0; 3])
 }
 
 /// Which of its three settings Blender wrote in: that in which most lamps have the watts that somebody types, such as 10 or

@@ -35,7 +35,7 @@ use super::tangents;
 use crate::scene::{Instance, Material, Mesh, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use raw::Raw;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -72,10 +72,14 @@ pub(super) fn load(
         None => mtl::spawn_all(file, folder, &raw.libraries, overrides, sink),
     };
     let library = Library::new(&library);
+    // Colours at the vertices are all of it.
+    let has_colors = !raw.colors.is_empty();
+    let base_color = if has_colors { Vec3::ONE } else { Material::default().base_color };
+    let plain = Material { base_color, ..Material::default() };
     let materials: Vec<Entity> = raw
         .materials
         .iter()
-        .map(|name| material_entity(file, name.as_deref(), &library, overrides, sink))
+        .map(|name| material_entity(file, name.as_deref(), &library, &plain, overrides, sink))
         .collect();
     sink.begin(Phase::Meshes);
     let mut done = geometry::finish(assemble::mesh(&raw), false, |_| true);
@@ -125,11 +129,12 @@ fn bare_name(name: &str) -> &str {
     lines::unquoted(lines::before_comment(name))
 }
 
-/// The entity for a `usemtl` name, or for faces before the first one.
+/// The entity for a `usemtl` name, or for faces before the first one; `plain` is what there is without any.
 fn material_entity(
     file: &str,
     name: Option<&str>,
     library: &Library<'_>,
+    plain: &Material,
     overrides: &mut Materials,
     sink: &mut Sink<'_>,
 ) -> Entity {
@@ -140,8 +145,10 @@ fn material_entity(
         return nameless;
     }
     let Some(name) = name.filter(|name| !name.is_empty()) else {
-        sink.decide(file, "surfaces without a material are light grey");
-        return sink.spawn((Name::new("default"), Material::default()));
+        if plain.base_color != Vec3::ONE {
+            sink.decide(file, "surfaces without a material are light grey");
+        }
+        return sink.spawn((Name::new("default"), plain.clone()));
     };
     if let Some(&known) = library.exact.get(name).or_else(|| library.bare.get(bare_name(name))) {
         return known;
@@ -155,5 +162,5 @@ fn material_entity(
         return entity;
     }
     sink.repaired(file, "", format!("material `{short}` is not defined; light grey"));
-    sink.spawn((Name::new(short), Material::default()))
+    sink.spawn((Name::new(short), plain.clone()))
 }

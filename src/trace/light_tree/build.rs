@@ -91,9 +91,8 @@ impl LightTree {
     }
 
     fn push<'a>(&mut self, groups: impl Iterator<Item = &'a Group>, parent: (u32, u32)) -> u32 {
-        let groups: Vec<(&Group, f64)> = groups
-            .map(|group| (group, self.intensity(group.places.start, group.places.len())))
-            .collect();
+        let groups: Vec<(&Group, f64)> =
+            groups.map(|group| (group, self.intensity(group.places.start, group.places.len()))).collect();
         self.nodes.push(Node::new(&groups, parent));
         self.nodes.len() as u32 - 1
     }
@@ -119,7 +118,10 @@ fn part(emitters: &[Emitter], order: &mut [u32], place: usize, depth: u32) -> Pa
 }
 
 /// Both, and whether they are alike; each of them may be many, alike or not.
-fn together((first, first_alike): (Emitter, bool), (second, second_alike): (Emitter, bool)) -> (Emitter, bool) {
+fn together(
+    (first, first_alike): (Emitter, bool),
+    (second, second_alike): (Emitter, bool),
+) -> (Emitter, bool) {
     let all = first.union(&second);
     // Those of no common direction only if each of them shines to all sides.
     let is_one_way = |emitter: &Emitter| emitter.spread <= ALIKE;
