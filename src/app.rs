@@ -92,7 +92,7 @@ pub struct FrameStats {
     /// How well it is known: see [`noise::Noise::doubt`].
     pub noise_doubt: f64,
     /// Samples per pixel that `noise` is of; 0 if it is of none.
-    pub noise_samples: u32,
+    pub noise_samples: f64,
     /// Rays since the world was made, by kind.
     pub rays: RayCounts,
     /// Seconds spent tracing since the world was made.
@@ -234,6 +234,8 @@ const FEW_SAMPLES: f64 = 3.0;
 
 /// How many times as long as an estimate of the noise takes is traced before the next, unless it is asked for.
 const ESTIMATE: f64 = 20.0;
+/// For who watches it is made after so many seconds, whatever it takes.
+const LATE: f64 = 0.3;
 
 /// When the noise was estimated, in seconds of tracing, and how long that took.
 #[derive(Default)]
@@ -262,7 +264,7 @@ pub fn trace_frame(
     if film.region() != budget.region {
         film.confine(budget.region);
         // What was known of other pixels.
-        (stats.noise, stats.noise_samples) = (None, 0);
+        (stats.noise, stats.noise_samples) = (None, 0.0);
         estimated.at = f64::NEG_INFINITY;
     }
     let mut rays = RayCounts::default();
@@ -272,7 +274,7 @@ pub fn trace_frame(
     stats.begun = std::mem::replace(&mut *last, now) != now;
     if stats.begun {
         stats.noise = None;
-        stats.noise_samples = 0;
+        stats.noise_samples = 0.0;
         estimated.at = f64::NEG_INFINITY;
         if budget.preview {
             match preview.trace(&scene) {
@@ -327,19 +329,21 @@ pub fn trace_frame(
     stats.dropped = film.dropped();
     // The estimate costs as much as a few samples: it is made each time the count has grown by a quarter, if by then it has
     // become cheap beside them.
-    let is_cheap = stats.trace_seconds - estimated.at >= ESTIMATE * estimated.took;
-    let complete = film.complete_samples();
+    let longest = if budget.develop { LATE } else { f64::INFINITY };
+    let is_cheap = stats.trace_seconds - estimated.at >= (ESTIMATE * estimated.took).min(longest);
+    // Of all pixels together: where noise is unequal so are they, and a pass over all takes long.
+    let samples = stats.samples_per_pixel;
     let has_time = stats.done || !(budget.develop && budget.interrupt.load(Ordering::Relaxed));
-    if complete >= 2
+    if film.complete_samples() >= 2
         && has_time
-        && (is_cheap && complete >= stats.noise_samples + stats.noise_samples.div_ceil(4) || stats.done)
-        && complete != stats.noise_samples
+        && (is_cheap && samples >= 1.25 * stats.noise_samples || stats.done)
+        && samples != stats.noise_samples
     {
         let start = Instant::now();
         let noise = noise::estimate(&film);
         *estimated = Estimated { at: stats.trace_seconds, took: start.elapsed().as_secs_f64() };
         stats.noise = noise.map(|noise| noise.relative);
         stats.noise_doubt = noise.map_or(0.0, |noise| noise.doubt);
-        stats.noise_samples = complete;
+        stats.noise_samples = samples;
     }
 }

@@ -16,7 +16,7 @@ use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -121,6 +121,12 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let start = Instant::now();
     let resolution = options.resolution.or(wishes.size.map(|size| size.to_array()));
     let mut options = LoadOptions { resolution, ..options.clone() };
+    let edited = edited_scene(source).filter(|_| options.scene_settings.is_none());
+    let (source, edits_file) = match &edited {
+        Some((scene, edits)) => (scene, Some(edits)),
+        None => (source, None),
+    };
+    options.scene_settings = options.scene_settings.or_else(|| edits_file.cloned());
     let mut app = App::new(RenderSettings::default());
     let (mut report, edits) = load_unedited(&mut app.world, source, &options)?;
     choose_camera(&mut app.world, &report, &source.name(), wishes)?;
@@ -194,6 +200,18 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
 }
 
+/// The scene beside a file of edits that was saved beside it, and that file.
+fn edited_scene(source: &SceneSource) -> Option<(SceneSource, PathBuf)> {
+    let SceneSource::File(edits) = source else { return None };
+    let (stem, number) = edits.file_name()?.to_str()?.strip_suffix(".toml")?.rsplit_once(".edits_")?;
+    number.parse::<u32>().ok()?;
+    let mut scenes = ["gltf", "glb", "obj", "toml"]
+        .map(|ending| edits.with_file_name(format!("{stem}.{ending}")))
+        .into_iter();
+    let scene = scenes.find(|scene| scene.is_file())?;
+    Some((SceneSource::File(scene), edits.clone()))
+}
+
 /// What to say of edits that were saved beside the scene: they are applied only if somebody asks for them.
 fn edits_beside(source: &SceneSource) -> Option<String> {
     let SceneSource::File(scene) = source else { return None };
@@ -207,7 +225,7 @@ fn edits_beside(source: &SceneSource) -> Option<String> {
     let newest = folder.join(format!("{stem}{}.toml", numbers.last()?));
     let newest = newest.strip_prefix(".").unwrap_or(&newest).display();
     let which = if numbers.len() > 1 { format!(" (the last of {})", numbers.len()) } else { String::new() };
-    Some(format!("edits saved beside it are not applied: --scene-settings {newest} does that{which}"))
+    Some(format!("edits saved beside it are not applied: open {newest} for that{which}"))
 }
 
 /// A size of this width over height with as many pixels as `usual`, but no higher than a screen.

@@ -6,6 +6,7 @@
 //! forward, and D. Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007.
 
 use super::aim::{Old, RUN, Ways};
+use super::fill::side;
 use super::grid::{Grid, note};
 use super::runs::{Run, runs};
 use super::{MOST, Shown};
@@ -90,7 +91,7 @@ impl Shown {
             let at = move |x: u32, y: u32| (y * width + x) as usize;
             let is_outline = move |x: u32, y: u32| {
                 let here = &spots[at(x, y)];
-                let pixel = sheet.pixel(sheet.own(here.position).z.max(0.0));
+                let pixel = side(sheet, here);
                 let differs = |x: u32, y: u32| !here.continues(&spots[at(x, y)], pixel);
                 x > 0 && differs(x - 1, y)
                     || x + 1 < width && differs(x + 1, y)

@@ -21,7 +21,7 @@ use crate::open::{LoadCard, SceneOrigin};
 use crate::preview::Preview;
 use crate::shown::Shown;
 use crate::sync::Redone;
-use crate::trace::Viewpoint;
+use crate::trace::{Film, Viewpoint};
 use bevy_ecs::prelude::*;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -161,7 +161,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             let plays = app.world.resource::<Clock>().runs();
             let input = app.world.resource::<Input>();
             let moving = plays || input.is_moving() || input.has_motion();
-            let paused = app.world.resource::<Paused>().0;
+            let paused = rests(app);
             app.world.resource_mut::<FrameBudget>().time = Some(match (paused, moving) {
                 (true, _) => Duration::ZERO,
                 (false, true) => MOVING,
@@ -184,10 +184,7 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
             let held = app.world.resource::<Input>().is_moving() || app.world.resource::<Clock>().runs();
             // A frame that was cut off has shown nothing, and what cut it off may have been read before.
             let cut_off = self.interrupt.load(Ordering::SeqCst);
-            idle = !held
-                && !cut_off
-                && (stats.done || app.world.resource::<Paused>().0)
-                && !app.world.resource::<Pending>().0;
+            idle = !held && !cut_off && (stats.done || rests(app)) && !app.world.resource::<Pending>().0;
             say(app, &self.wake);
             self.publish(app, version, moving, asked);
             let shown = app.world.resource::<Picture>().version;
@@ -308,6 +305,11 @@ impl<W: Fn(Wake) + Clone + Send + Sync + 'static> Engine<W> {
         }
         false
     }
+}
+
+/// Whether nothing is to be refined: but what was changed meanwhile is seen whole.
+fn rests(app: &App) -> bool {
+    app.world.resource::<Paused>().0 && app.world.resource::<Film>().complete_samples() > 0
 }
 
 /// How much of the scene is not as its files say; nothing if all is.

@@ -118,6 +118,7 @@ impl Tap {
                 | Self::Hide
                 | Self::Duplicate
                 | Self::Undo
+                | Self::Redo
                 | Self::SaveEdits
         )
     }

@@ -157,7 +157,7 @@ pub struct Instrument {
     resets: u64,
     region: Option<[UVec2; 2]>,
     start_seconds: f64,
-    noted: u32,
+    noted: f64,
 }
 
 impl Instrument {
@@ -198,7 +198,7 @@ pub fn note_noise(
             instrument.start_seconds = stats.trace_seconds - stats.frame_seconds;
         }
         (instrument.resets, instrument.region) = (redone.resets, film.region());
-        instrument.noted = 0;
+        instrument.noted = 0.0;
         instrument.convergence = Convergence::default();
         let graph = Arc::make_mut(&mut instrument.graph);
         if graph.current.len() >= WORTH_KEEPING {
@@ -218,11 +218,11 @@ pub fn note_noise(
     let reference = instrument.reference.as_ref();
     let error = reference.and_then(|reference| reference.error(&film, &viewpoint, &seen()));
     notices.0.extend(instrument.reference.as_mut().and_then(|reference| reference.complain(film.size())));
-    instrument.convergence.note(f64::from(stats.noise_samples), noise);
+    instrument.convergence.note(stats.noise_samples, noise);
     let law = instrument.convergence.law();
     let goal = GOALS.into_iter().find(|&goal| goal < noise * 0.95);
     let forecast = goal.and_then(|goal| {
-        let more = instrument.convergence.samples_to(goal)? - f64::from(stats.noise_samples);
+        let more = instrument.convergence.samples_to(goal)? - stats.noise_samples;
         Some(Forecast { goal, seconds: more.max(0.0) * seconds / samples })
     });
     let graph = Arc::make_mut(&mut instrument.graph);
@@ -255,7 +255,7 @@ mod tests {
         while n <= samples {
             let mut stats = world.resource_mut::<FrameStats>();
             stats.noise = Some(0.4 / f64::from(n).sqrt());
-            stats.noise_samples = n;
+            stats.noise_samples = f64::from(n);
             stats.samples_per_pixel = f64::from(n);
             let seconds = before + 0.1 * f64::from(n);
             stats.frame_seconds = seconds - stats.trace_seconds;

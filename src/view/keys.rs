@@ -6,10 +6,13 @@ use super::replay::Event;
 use super::ui::open::{Prompt, Typed};
 use super::window::Viewer;
 use std::collections::HashMap;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use winit::event::{ElementState, KeyEvent};
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::{Key, KeyCode, PhysicalKey};
+
+/// So long the user has to say that edits may be lost.
+const PATIENCE: Duration = Duration::from_secs(6);
 
 /// The keys that are down and held for something. What one means is decided when it goes down, by the modifiers that are
 /// down then, and stays until it goes up.
@@ -85,14 +88,33 @@ impl Viewer {
         };
         let text = pasted.as_deref().or(text.filter(|_| !control));
         match prompt.key(code, text, control) {
-            Typed::On => {}
             Typed::Nothing => self.ui.prompt = None,
-            Typed::Open(path) => {
+            Typed::Open(path) if self.may_lose_edits() => {
                 self.tried = self.ui.prompt.take();
                 self.record(&Event::Open(path.clone()));
                 self.send(Command::Open(path));
             }
+            Typed::On | Typed::Open(_) => {}
         }
+    }
+
+    /// Ends the program, if nothing is lost by that.
+    pub(super) fn leave_program(&mut self, event_loop: &ActiveEventLoop) {
+        if self.may_lose_edits() {
+            event_loop.exit();
+        }
+    }
+
+    /// Whether another scene may take the place of this one: if there are edits that no file has, the user is told first, and does
+    /// it again if that is meant.
+    pub(super) fn may_lose_edits(&mut self) -> bool {
+        let is_unsaved = self.status.as_ref().is_some_and(|status| status.unsaved);
+        if !is_unsaved || self.warned.is_some_and(|at| at.elapsed() < PATIENCE) {
+            return true;
+        }
+        self.warned = Some(Instant::now());
+        self.say("your edits are not saved: {save_edits} saves them; once more to go without");
+        false
     }
 
     /// A key went down or up, or is down for long.
@@ -111,6 +133,7 @@ impl Viewer {
         let Some(entry) = self.keys.meaning(code, &self.options.keys) else {
             return;
         };
+        self.is_new_here = false;
         match entry.action {
             // Keys that are down when the window gets the focus were meant for somebody else.
             action if is_synthetic && !is_modifier(action) => {}
@@ -137,8 +160,15 @@ impl Viewer {
         match tap {
             Tap::HudLevel => self.ui.level = self.ui.level.next(),
             Tap::Graph => self.ui.graph = !self.ui.graph,
-            Tap::Help => self.ui.help.turn(),
-            Tap::Report => self.ui.report = !self.ui.report,
+            // One of both: each covers the picture.
+            Tap::Help => {
+                self.ui.report = false;
+                self.ui.help.turn();
+            }
+            Tap::Report => {
+                self.ui.help.close();
+                self.ui.report = !self.ui.report;
+            }
             Tap::Open => {
                 self.tried = None;
                 self.ui.prompt = Some(Prompt::new(&self.options.folder));
@@ -148,7 +178,7 @@ impl Viewer {
                 self.split = self.cursor_in_picture().x;
                 return self.pass_on(tap);
             }
-            Tap::Quit => event_loop.exit(),
+            Tap::Quit => self.leave_program(event_loop),
             Tap::Screenshot | Tap::ScreenshotWithHud if self.picture.rgba.is_empty() => {
                 self.say("there is no picture yet");
             }

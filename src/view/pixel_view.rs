@@ -6,12 +6,12 @@ use super::engine::Pending;
 use super::input::Input;
 use super::instrument::{Instrument, Seen};
 use super::keymap::Tap;
-use super::status::significant;
+use super::status::{percent, significant};
 use crate::app::FrameBudget;
 use crate::image::compare::LinearImage;
 use crate::image::{Display, Picture};
 use crate::open::SceneOrigin;
-use crate::report::false_color::ErrorScale;
+use crate::report::false_color::{DECADES, ErrorScale};
 use crate::scene::color::{luminance, srgb_from_linear};
 use crate::scene::{Playing, SceneBounds};
 use crate::sync::{Redone, Traceable};
@@ -285,10 +285,12 @@ fn colors(
     })
 }
 
-/// Relative errors, logarithmic from 0.1 % to 100 %.
+/// Relative errors, logarithmic over three decades up to the one that hardly any exceeds, at most 100 %.
 fn errors(values: &[f32]) -> Colors {
-    let scale = ErrorScale { most: 1.0 };
-    let range = Some(["0.1 %".to_owned(), "100 %".to_owned()]);
+    let all: Vec<f64> = values.iter().map(|&value| f64::from(value)).collect();
+    let most = ErrorScale::of(&[all]).most.min(1.0);
+    let scale = ErrorScale { most };
+    let range = Some([most / 10f64.powi(DECADES), most].map(percent));
     (values.iter().map(|&value| scale.color(f64::from(value))).collect(), range)
 }
 

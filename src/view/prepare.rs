@@ -135,6 +135,7 @@ pub fn status(app: &App) -> Status {
         legend: world.resource::<CurrentLegend>().0.clone(),
         debug: world.resource::<Debug>().status(),
         edit: world.resource::<Editor>().status(),
+        unsaved: world.resource::<Editor>().is_unsaved(),
         rays_per_second: stats.rays_per_second,
         preview_scale: stats.preview_scale,
         kept: shown.kept_share(world.resource::<Film>().complete_samples(), stats.done),

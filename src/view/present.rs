@@ -81,6 +81,7 @@ impl Viewer {
             loading: self.loading.as_deref(),
             notice: &self.notice,
             compared: other.as_ref().map(|(side, part)| (side.name, *part)),
+            hint: self.is_new_here,
             keys: &self.options.keys,
             letters: &self.letters,
         };
@@ -131,14 +132,14 @@ impl Viewer {
                 self.latencies.pop_front();
             }
         }
-        let title = match &self.status {
-            None => format!("{} - loading", self.options.title),
-            Some(s) if s.done => format!("{} - done", self.options.title),
-            Some(s) if s.paused => format!("{} - paused", self.options.title),
-            Some(s) => {
-                format!("{} - {:.0} of {}", self.options.title, s.samples_per_pixel.floor(), s.sample_target)
-            }
+        let state = match &self.status {
+            None => "loading".to_owned(),
+            Some(s) if s.done => "done".to_owned(),
+            Some(s) if s.paused => "paused".to_owned(),
+            Some(s) => format!("{:.0} of {}", s.samples_per_pixel.floor(), s.sample_target),
         };
+        let mark = if self.status.as_ref().is_some_and(|status| status.unsaved) { "*" } else { "" };
+        let title = format!("{}{mark} - {state}", self.options.title);
         let is_final = self.status.as_ref().is_none_or(|s| s.done || s.paused);
         let long_ago = self.titled_at.is_none_or(|at| now - at > TITLE_PACE);
         if title != self.title
@@ -229,6 +230,7 @@ impl Viewer {
                 loading: self.loading.as_deref(),
                 notice: &self.notice,
                 compared: None,
+                hint: false,
                 keys: &self.options.keys,
                 letters: &self.letters,
             };

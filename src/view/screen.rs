@@ -49,7 +49,10 @@ impl Screen {
     ) -> Result<Self, String> {
         let [width, height] = size.max(UVec2::ONE).to_array();
         let inside: Size = match in_points {
-            true => LogicalSize::new(width, height).into(),
+            true => {
+                let fits = fitting(event_loop, [width, height].map(f64::from));
+                LogicalSize::new(f64::from(width) * fits, f64::from(height) * fits).into()
+            }
             false => PhysicalSize::new(width, height).into(),
         };
         let attributes = Window::default_attributes().with_title(title).with_inner_size(inside);
@@ -198,6 +201,24 @@ pub fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
     outcome.map_err(|panic| panic_message(&*panic))
 }
 
+/// Of the screen, what a window may take at most: there are borders and bars.
+const ROOM: f64 = 0.9;
+
+/// What a window of so many points is to be scaled by to fit the screen; 1 if it does, or nobody knows.
+fn fitting(event_loop: &ActiveEventLoop, points: [f64; 2]) -> f64 {
+    let monitor = event_loop.primary_monitor().or_else(|| event_loop.available_monitors().next());
+    let Some(monitor) = monitor else { return 1.0 };
+    let screen = monitor.size().to_logical::<f64>(monitor.scale_factor());
+    share_of(points, [screen.width, screen.height])
+}
+
+/// The same for a screen of so many points.
+fn share_of(points: [f64; 2], screen: [f64; 2]) -> f64 {
+    let shares = [0, 1].map(|axis| ROOM * screen[axis] / points[axis]);
+    // Of no size at all it is none.
+    shares.into_iter().filter(|share| *share > 0.0).fold(1.0, f64::min)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,6 +250,14 @@ mod tests {
         }
         assert_eq!(said, Presented::Lost("gone".to_owned()));
         assert!(matches!(became(Err(Error::AdapterNotFound), None, &mut 0), Presented::Lost(_)));
+    }
+
+    #[test]
+    fn a_window_is_no_larger_than_the_screen() {
+        assert_eq!(share_of([960.0, 540.0], [1400.0, 1000.0]), 1.0);
+        let fits = share_of([960.0, 540.0], [466.0, 333.0]);
+        assert!((960.0 * fits - 0.9 * 466.0).abs() < 1e-9, "{fits}");
+        assert_eq!(share_of([960.0, 540.0], [0.0, 0.0]), 1.0, "nobody knows");
     }
 
     #[test]

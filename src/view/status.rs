@@ -34,6 +34,8 @@ pub struct Status {
     pub debug: DebugStatus,
     /// What is selected.
     pub edit: Option<Arc<EditStatus>>,
+    /// Whether no file has what was edited.
+    pub unsaved: bool,
     /// Rays of all kinds per second of tracing.
     pub rays_per_second: f64,
     /// Side of a preview pixel.
@@ -304,6 +306,7 @@ pub(super) mod tests {
             legend: None,
             debug: DebugStatus::default(),
             edit: None,
+            unsaved: false,
             rays_per_second: 1.234_5e6,
             preview_scale: Some(4),
             kept: 0.0,

@@ -79,6 +79,10 @@ pub struct Viewer {
     clipboard: Option<arboard::Clipboard>,
     /// Where the recording says that the cursor is.
     pub(super) recorded_cursor: Option<DVec2>,
+    /// The user has not pressed any key yet.
+    pub(super) is_new_here: bool,
+    /// When the user was told that edits are not saved.
+    pub(super) warned: Option<Instant>,
     pub(super) title: String,
     pub(super) titled_at: Option<Instant>,
     pub(super) presented: VecDeque<Instant>,
@@ -154,6 +158,8 @@ impl Viewer {
             tried: None,
             clipboard: None,
             recorded_cursor: None,
+            is_new_here: true,
+            warned: None,
             title: String::new(),
             titled_at: None,
             presented: VecDeque::new(),
@@ -344,7 +350,7 @@ impl ApplicationHandler<Wake> for Viewer {
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         match event {
-            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::CloseRequested => self.leave_program(event_loop),
             WindowEvent::Destroyed => {
                 // Nothing may be asked of the window any more.
                 self.screen = None;
@@ -357,7 +363,7 @@ impl ApplicationHandler<Wake> for Viewer {
                 self.redraw();
             }
             WindowEvent::Focused(false) => self.leave(),
-            WindowEvent::DroppedFile(path) => {
+            WindowEvent::DroppedFile(path) if self.may_lose_edits() => {
                 self.record(&Event::Open(path.clone()));
                 self.send(Command::Open(path));
             }

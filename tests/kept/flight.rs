@@ -58,15 +58,6 @@ pub fn step(app: &mut App, way: f64, angle: f64) {
     pose.0.matrix3 = DMat3::from_axis_angle(DVec3::Y, angle) * axes;
 }
 
-/// To the right, by so many radii of what is seen.
-pub fn step_aside(app: &mut App, way: f64) {
-    let camera = app.world.resource::<ActiveCamera>().0;
-    let radius = app.world.resource::<penumbra::scene::SceneBounds>().radius;
-    let mut pose = app.world.get_mut::<Transform>(camera).unwrap();
-    let aside = pose.0.matrix3.x_axis;
-    pose.0.translation += aside * way * radius;
-}
-
 /// One frame for a view that changes, with so much time for more than the preview.
 pub fn moving(app: &mut App, time: Duration) -> Duration {
     app.world.resource_mut::<FrameBudget>().time = Some(time);

@@ -4,13 +4,13 @@
 mod flight;
 
 use bevy_ecs::prelude::*;
-use flight::{HEAD, flights, fly, moving, rest, row, step, step_aside, watched};
+use flight::{HEAD, flights, fly, moving, rest, row, step, watched};
 use glam::{UVec2, Vec3};
 use penumbra::app::App;
 use penumbra::image::Picture;
 use penumbra::image::compare::LinearImage;
 use penumbra::preview::Preview;
-use penumbra::scene::{ActiveCamera, Glass, Glossy, Lens, Light, Material};
+use penumbra::scene::{ActiveCamera, Glass, Glossy, Lens, Light, Material, SceneBounds, Transform};
 use penumbra::shown::{FADE, Shown};
 use penumbra::trace::{Integrator, RenderSettings};
 use std::time::Duration;
@@ -93,6 +93,15 @@ fn what_comes_into_view_gets_samples_of_its_own() {
     }
     println!("squared error {of_shown:.2e}, of the preview alone {of_preview:.2e}");
     assert!(of_shown < 0.5 * of_preview);
+}
+
+/// To the right, by so many radii of what is seen.
+fn step_aside(app: &mut App, way: f64) {
+    let camera = app.world.resource::<ActiveCamera>().0;
+    let radius = app.world.resource::<SceneBounds>().radius;
+    let mut pose = app.world.get_mut::<Transform>(camera).unwrap();
+    let aside = pose.0.matrix3.x_axis;
+    pose.0.translation += aside * way * radius;
 }
 
 /// What shows two surfaces is of neither: carried along with one of them it would leave a trail of the other's colour.

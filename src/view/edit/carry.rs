@@ -6,14 +6,16 @@ use super::{Editor, Selection};
 use crate::load::settings::edit::{Changed, EditTable, change};
 use crate::scene::path::{find, path_of};
 use bevy_ecs::prelude::*;
+use std::sync::Arc;
 
 /// Does to `to`, the scene of `from` loaded again, what was done to `from`. Things are known by their paths, for they
 /// are other entities now; edits of what is not there wait until it is.
 pub fn carry(from: &World, to: &mut World) {
     let Some(before) = from.get_resource::<Editor>() else { return };
-    let mut editor = Editor { row: before.row, dirty: true, ..Editor::default() };
+    let saved = Arc::clone(&before.saved);
+    let mut editor = Editor { row: before.row, dirty: true, saved, ..Editor::default() };
     for table in tables(from, before) {
-        redo(to, &mut editor, table);
+        edit_again(to, &mut editor, table);
     }
     editor.selected = before.selected.and_then(|Selection { entity, slot }| {
         Some(Selection { entity: find(to, &path_of(from, entity))?, slot })
@@ -22,7 +24,7 @@ pub fn carry(from: &World, to: &mut World) {
     to.insert_resource(editor);
 }
 
-fn redo(world: &mut World, editor: &mut Editor, table: EditTable) {
+fn edit_again(world: &mut World, editor: &mut Editor, table: EditTable) {
     if table.entity.is_empty() {
         return;
     }
@@ -37,6 +39,7 @@ fn redo(world: &mut World, editor: &mut Editor, table: EditTable) {
     // What does not fit any more, such as the sizes of another kind of light, is as the files say.
     if let Ok(Changed::New(entity)) = change(world, &table) {
         editor.copies.push((entity, original));
-        editor.undo.push(Undo::of_copy(Selection { entity, slot }, selection));
+        let made = Undo::of_copy(world, Selection { entity, slot }, selection);
+        editor.undo.push(made);
     }
 }

@@ -13,15 +13,16 @@ use super::keymap::Tap;
 use crate::app::FrameStats;
 use crate::load::settings::edit::{EditTable, duplicate};
 use crate::scene::path::path_of;
-use crate::scene::{Hidden, Playing, SceneBounds};
+use crate::scene::{Hidden, Instance, Light, Playing, SceneBounds};
 use crate::sync::Redone;
+use crate::trace::Lights;
 use bevy_ecs::prelude::*;
 use choice::{kind_of, pick, stepped, things};
 use glam::DVec2;
 use property::{Property, Row, rows, set};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use undo::{Undo, remember, undo};
+use undo::{Undo, redo, remember, remember_too, set_hidden, undo};
 
 /// What is selected, and what was done.
 #[derive(Resource, Clone, Debug, Default)]
@@ -30,6 +31,10 @@ pub struct Editor {
     /// Which of its rows the keys change.
     row: usize,
     undo: Vec<Undo>,
+    /// What was undone, the last at the end.
+    redo: Vec<Undo>,
+    /// What a file has of [`Editor::written`].
+    saved: Arc<str>,
     /// What was changed: entity and material slot. In this order.
     edited: Vec<(Entity, usize)>,
     /// Copies, and what they are of.
@@ -47,6 +52,8 @@ pub struct Editor {
     lost: f64,
     dirty: bool,
     redone: String,
+    /// No light is left.
+    dark: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +106,12 @@ impl Editor {
         &self.written
     }
 
+    /// Whether no file has what was edited.
+    #[must_use]
+    pub fn is_unsaved(&self) -> bool {
+        self.has_edits() && self.written != self.saved
+    }
+
     fn note(&mut self, selection: Selection) {
         let Selection { entity, slot } = selection;
         if !self.edited.contains(&(entity, slot)) {
@@ -112,7 +125,7 @@ pub fn edit_scene(world: &mut World) {
     let input = world.resource::<Input>();
     let presses: Vec<_> = input.taps.iter().filter(|press| press.tap.edits()).copied().collect();
     let mut values = input.edits.clone();
-    if presses.iter().any(|press| press.tap == Tap::Undo) {
+    if presses.iter().any(|press| matches!(press.tap, Tap::Undo | Tap::Redo)) {
         // They are of a card whose thing may be gone.
         values.clear();
     }
@@ -135,8 +148,12 @@ pub fn edit_scene(world: &mut World) {
             Tap::Hide => hide(world, &mut editor),
             Tap::Duplicate => copy(world, &mut editor),
             Tap::Undo => undo(world, &mut editor),
+            Tap::Redo => redo(world, &mut editor),
             Tap::SaveEdits => {
                 let said = save::save(world, &editor);
+                if let Notice::Saved(..) = said {
+                    editor.saved = save::edits(world, &editor).unwrap_or_default().into();
+                }
                 world.resource_mut::<Notices>().0.push(said);
             }
             _ => {}
@@ -144,6 +161,11 @@ pub fn edit_scene(world: &mut World) {
     }
     for (property, value) in values {
         change(world, &mut editor, property, value);
+        // What the mouse has changed the keys change next.
+        if let Some(Selection { entity, slot }) = editor.selected {
+            let rows = rows(world, entity, slot, radius(world));
+            editor.row = rows.iter().position(|row| row.property == property).unwrap_or(editor.row);
+        }
     }
     editor.dirty = true;
     world.insert_resource(editor);
@@ -212,13 +234,30 @@ fn selected(world: &mut World, editor: &Editor) -> Option<Selection> {
 fn hide(world: &mut World, editor: &mut Editor) {
     let Some(selection) = selected(world, editor) else { return };
     remember(world, editor, selection, None);
-    let mut entity = world.entity_mut(selection.entity);
-    if entity.contains::<Hidden>() {
-        entity.remove::<Hidden>();
-    } else {
-        entity.insert(Hidden);
-    }
+    let hidden = world.get::<Hidden>(selection.entity).is_none();
+    set_hidden(world, selection.entity, hidden);
     editor.note(selection);
+    // What moves with it goes with it.
+    for entity in below(world, selection.entity) {
+        if world.get::<Hidden>(entity).is_some() != hidden {
+            remember_too(world, editor, entity);
+            set_hidden(world, entity, hidden);
+            editor.note(Selection { entity, slot: 0 });
+        }
+    }
+}
+
+/// All things and lights below an entity.
+fn below(world: &World, top: Entity) -> Vec<Entity> {
+    let children = |entity| world.get::<Children>(entity).map_or(&[][..], |children| children);
+    let (mut found, mut next) = (Vec::new(), children(top).to_vec());
+    while let Some(entity) = next.pop() {
+        if world.get::<Instance>(entity).is_some() || world.get::<Light>(entity).is_some() {
+            found.push(entity);
+        }
+        next.extend(children(entity));
+    }
+    found
 }
 
 fn copy(world: &mut World, editor: &mut Editor) {
@@ -229,7 +268,8 @@ fn copy(world: &mut World, editor: &mut Editor) {
     crate::app::propagate(world);
     editor.copies.push((copy, selection.entity));
     let copied = Selection { entity: copy, slot: selection.slot };
-    editor.undo.push(Undo::of_copy(copied, selection));
+    editor.redo.clear();
+    editor.undo.push(Undo::of_copy(world, copied, selection));
     editor.selected = Some(copied);
     // Beside the original, not in it.
     let rows = rows(world, copy, 0, radius(world));
@@ -262,6 +302,10 @@ pub fn finish_sync(world: &mut World) {
     editor.written = save::edits(world, &editor).unwrap_or_default().into();
     if dirty {
         show(world, &mut editor);
+        let dark = world.resource::<Lights>().is_empty();
+        if !std::mem::replace(&mut editor.dark, dark) && dark {
+            say(world, "that was the last light: {undo} brings it back");
+        }
     }
     world.insert_resource(editor);
 }

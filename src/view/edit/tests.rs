@@ -174,6 +174,77 @@ fn an_undone_copy_is_gone_and_with_all_undone_nothing_was_edited() {
 }
 
 #[test]
+fn what_was_undone_is_done_again_until_something_else_is_done() {
+    for scene in ["cornell", "gallery"] {
+        let mut app = editable(scene);
+        change_all(&mut app, PLACES[1]);
+        press(&mut app, Tap::Duplicate, [0.5; 2]);
+        press(&mut app, Tap::More, [0.5; 2]);
+        press(&mut app, Tap::Hide, [0.5; 2]);
+        choose(&mut app, PLACES[0]);
+        press(&mut app, Tap::More, [0.5; 2]);
+        let identity = |app: &App| Identity::of(&app.world, scene.to_owned());
+        let (edited, written) = (identity(&app), app.world.resource::<Editor>().written().to_owned());
+        let steps = app.world.resource::<Editor>().undo.len();
+        for _ in 0..2 {
+            (0..steps).for_each(|_| press(&mut app, Tap::Undo, [0.5; 2]));
+            assert_ne!(identity(&app).scene_hash, edited.scene_hash);
+            assert!(!app.world.resource::<Editor>().has_edits());
+            (0..steps).for_each(|_| press(&mut app, Tap::Redo, [0.5; 2]));
+            assert_eq!(identity(&app).differences(&edited), Vec::<String>::new(), "{scene}");
+            assert_eq!(app.world.resource::<Editor>().written(), written);
+        }
+        press(&mut app, Tap::Undo, [0.5; 2]);
+        press(&mut app, Tap::Less, [0.5; 2]);
+        let other = identity(&app);
+        press(&mut app, Tap::Redo, [0.5; 2]);
+        assert_eq!(identity(&app), other, "what was undone before is no more");
+    }
+}
+
+/// What moves with a thing is hidden with it, and back with one step.
+#[test]
+fn a_thing_is_hidden_with_all_below_it() {
+    let mut app = editable("cornell");
+    let mut instances = app.world.query_filtered::<Entity, With<Instance>>();
+    let top = instances.iter(&app.world).next().unwrap();
+    let lamp = app.world.query_filtered::<Entity, With<Light>>().iter(&app.world).next().unwrap();
+    app.world.entity_mut(lamp).insert(ChildOf(top));
+    app.frame();
+    let before = Identity::of(&app.world, "cornell".to_owned());
+    app.world.resource_mut::<Editor>().selected = Some(Selection { entity: top, slot: 0 });
+    press(&mut app, Tap::Hide, [0.5; 2]);
+    let hidden = |app: &App| [top, lamp].map(|entity| app.world.get::<Hidden>(entity).is_some());
+    assert_eq!(hidden(&app), [true; 2]);
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    assert_eq!(hidden(&app), [false; 2]);
+    assert_eq!(Identity::of(&app.world, "cornell".to_owned()), before);
+    press(&mut app, Tap::Redo, [0.5; 2]);
+    assert_eq!(hidden(&app), [true; 2]);
+    press(&mut app, Tap::Hide, [0.5; 2]);
+    assert_eq!(hidden(&app), [false; 2]);
+}
+
+#[test]
+fn edits_are_unsaved_until_a_file_has_them() {
+    let mut app = editable("cornell");
+    let unsaved = |app: &App| app.world.resource::<Editor>().is_unsaved();
+    assert!(!unsaved(&app));
+    choose(&mut app, PLACES[0]);
+    press(&mut app, Tap::More, [0.5; 2]);
+    assert!(unsaved(&app));
+    // As saving does it.
+    let mut editor = app.world.resource_mut::<Editor>();
+    editor.saved = editor.written.clone();
+    assert!(!unsaved(&app));
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    assert!(!unsaved(&app), "nothing to lose");
+    press(&mut app, Tap::Redo, [0.5; 2]);
+    press(&mut app, Tap::Hide, [0.5; 2]);
+    assert!(unsaved(&app));
+}
+
+#[test]
 fn who_selects_nothing_is_told() {
     for tap in [Tap::Hide, Tap::Duplicate, Tap::More] {
         let mut app = editable("cornell");

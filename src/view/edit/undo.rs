@@ -2,6 +2,8 @@
 
 use super::property::{Property, material_of};
 use super::{Editor, Selection, say};
+use crate::load::settings::edit::duplicate;
+use crate::scene::path::path_of;
 use crate::scene::{Hidden, Light, Material, Pose, Transform};
 use bevy_ecs::prelude::*;
 use std::time::{Duration, Instant};
@@ -25,27 +27,77 @@ pub(super) struct Undo {
     pub(super) light: Option<Light>,
     pub(super) material: Option<(Entity, Material)>,
     pub(super) hidden: bool,
+    /// It was done together with the one before.
+    pub(super) joined: bool,
+    /// What a copy is called.
+    pub(super) name: String,
 }
 
 impl Undo {
-    /// To undo a copy is to have it no more.
-    pub(super) fn of_copy(selection: Selection, original: Selection) -> Self {
+    /// How it is now.
+    fn now(world: &World, selection: Selection) -> Self {
+        let Selection { entity, slot } = selection;
+        let material = material_of(world, entity, slot);
         Self {
             selection,
-            original: Some(original),
+            original: None,
             property: None,
             at: Instant::now(),
-            transform: None,
-            pose: None,
-            light: None,
-            material: None,
-            hidden: false,
+            transform: world.get::<Transform>(entity).copied(),
+            pose: world.get::<Pose>(entity).copied(),
+            light: world.get::<Light>(entity).cloned(),
+            material: material.and_then(|m| Some((m, world.get::<Material>(m)?.clone()))),
+            hidden: world.get::<Hidden>(entity).is_some(),
+            joined: false,
+            name: path_of(world, entity).pop().unwrap_or_default(),
+        }
+    }
+
+    /// To undo a copy is to have it no more.
+    pub(super) fn of_copy(world: &World, copy: Selection, original: Selection) -> Self {
+        let nothing =
+            Self { transform: None, pose: None, light: None, material: None, ..Self::now(world, copy) };
+        Self { original: Some(original), ..nothing }
+    }
+
+    /// Makes it so again.
+    fn apply(self, world: &mut World) {
+        let entity = self.selection.entity;
+        // What an animation has moved since stays where that put it.
+        if let Some(transform) = self.transform
+            && world.get::<Pose>(entity).copied() == self.pose
+            && let Some(mut now) = world.get_mut::<Transform>(entity)
+        {
+            now.set_if_neq(transform);
+        }
+        if let Some(light) = self.light
+            && let Some(mut now) = world.get_mut::<Light>(entity)
+        {
+            now.set_if_neq(light);
+        }
+        if let Some((material, value)) = self.material
+            && let Some(mut now) = world.get_mut::<Material>(material)
+        {
+            now.set_if_neq(value);
+        }
+        set_hidden(world, entity, self.hidden);
+    }
+}
+
+/// Leaves a thing out of the picture, or not.
+pub(super) fn set_hidden(world: &mut World, entity: Entity, hidden: bool) {
+    if let Ok(mut entity) = world.get_entity_mut(entity) {
+        match (hidden, entity.contains::<Hidden>()) {
+            (true, false) => drop(entity.insert(Hidden)),
+            (false, true) => drop(entity.remove::<Hidden>()),
+            _ => {}
         }
     }
 }
 
-/// Remembers how it is now.
+/// Remembers how it is now. What was undone cannot be done again after that.
 pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection, property: Option<Property>) {
+    editor.redo.clear();
     let now = Instant::now();
     if let Some(last) = editor.undo.last_mut().filter(|_| property.is_some())
         && (last.selection, last.property) == (selection, property)
@@ -54,64 +106,76 @@ pub(super) fn remember(world: &World, editor: &mut Editor, selection: Selection,
         last.at = now;
         return;
     }
-    let Selection { entity, slot } = selection;
-    let material = material_of(world, entity, slot);
-    editor.undo.push(Undo {
-        selection,
-        original: None,
-        property,
-        at: now,
-        transform: world.get::<Transform>(entity).copied(),
-        pose: world.get::<Pose>(entity).copied(),
-        light: world.get::<Light>(entity).cloned(),
-        material: material.and_then(|m| Some((m, world.get::<Material>(m)?.clone()))),
-        hidden: world.get::<Hidden>(entity).is_some(),
-    });
+    editor.undo.push(Undo { property, ..Undo::now(world, selection) });
+}
+
+/// The same for something that is changed together with what was remembered last.
+pub(super) fn remember_too(world: &World, editor: &mut Editor, entity: Entity) {
+    editor.undo.push(Undo { joined: true, ..Undo::now(world, Selection { entity, slot: 0 }) });
 }
 
 pub(super) fn undo(world: &mut World, editor: &mut Editor) {
-    let Some(last) = editor.undo.pop() else { return say(world, "nothing to undo") };
-    let entity = last.selection.entity;
-    if let Some(original) = last.original {
-        editor.copies.retain(|(copy, _)| *copy != entity);
-        editor.edited.retain(|(edited, _)| *edited != entity);
-        world.despawn(entity);
-        crate::app::propagate(world);
-        editor.selected = Some(original);
-        return forget(editor);
-    }
-    // What an animation has moved since stays where that put it.
-    if let Some(transform) = last.transform
-        && world.get::<Pose>(entity).copied() == last.pose
-        && let Some(mut now) = world.get_mut::<Transform>(entity)
-    {
-        now.set_if_neq(transform);
-    }
-    if let Some(light) = last.light
-        && let Some(mut now) = world.get_mut::<Light>(entity)
-    {
-        now.set_if_neq(light);
-    }
-    if let Some((material, value)) = last.material
-        && let Some(mut now) = world.get_mut::<Material>(material)
-    {
-        now.set_if_neq(value);
-    }
-    if let Ok(mut entity) = world.get_entity_mut(entity) {
-        match (last.hidden, entity.contains::<Hidden>()) {
-            (true, false) => drop(entity.insert(Hidden)),
-            (false, true) => drop(entity.remove::<Hidden>()),
-            _ => {}
+    let Some(mut last) = editor.undo.pop() else { return say(world, "nothing to undo") };
+    loop {
+        let (selection, joined) = (last.selection, last.joined);
+        let now = Undo { original: last.original, joined, ..Undo::now(world, selection) };
+        if let Some(original) = last.original {
+            editor.copies.retain(|(copy, _)| *copy != selection.entity);
+            editor.edited.retain(|(edited, _)| *edited != selection.entity);
+            world.despawn(selection.entity);
+            editor.selected = Some(original);
+        } else {
+            last.apply(world);
+            editor.selected = Some(selection);
+        }
+        editor.redo.push(now);
+        match editor.undo.pop_if(|_| joined) {
+            Some(before) => last = before,
+            None => break,
         }
     }
     crate::app::propagate(world);
-    editor.selected = Some(last.selection);
-    forget(editor);
-}
-
-/// With all of it undone, nothing was edited.
-fn forget(editor: &mut Editor) {
+    // With all of it undone, nothing was edited.
     if editor.undo.is_empty() {
         editor.edited.clear();
     }
+}
+
+/// Does again what was undone last.
+pub(super) fn redo(world: &mut World, editor: &mut Editor) {
+    let Some(mut next) = editor.redo.pop() else { return say(world, "nothing to do again") };
+    loop {
+        if let Some(original) = next.original {
+            next.selection = copy_again(world, editor, &next, original);
+            let made = Undo { joined: next.joined, ..Undo::of_copy(world, next.selection, original) };
+            editor.undo.push(made);
+        } else {
+            editor.undo.push(Undo { joined: next.joined, ..Undo::now(world, next.selection) });
+        }
+        if !next.joined {
+            editor.selected = Some(next.selection);
+        }
+        editor.note(next.selection);
+        next.apply(world);
+        match editor.redo.pop_if(|next| next.joined) {
+            Some(after) => next = after,
+            None => break,
+        }
+    }
+    crate::app::propagate(world);
+}
+
+/// A copy that was there before; what is said of that one is meant of it.
+fn copy_again(world: &mut World, editor: &mut Editor, before: &Undo, original: Selection) -> Selection {
+    let copy = duplicate(world, original.entity, &before.name);
+    editor.copies.push((copy, original.entity));
+    let old = before.selection.entity;
+    for later in &mut editor.redo {
+        for selection in [Some(&mut later.selection), later.original.as_mut()].into_iter().flatten() {
+            if selection.entity == old {
+                selection.entity = copy;
+            }
+        }
+    }
+    Selection { entity: copy, ..before.selection }
 }

@@ -139,6 +139,8 @@ pub enum Tap {
     Duplicate,
     /// Take the last edit back.
     Undo,
+    /// Do again what was taken back.
+    Redo,
     /// Keep the edits in a file.
     SaveEdits,
     /// Next texture filter.

@@ -236,7 +236,9 @@ mod tests {
             let rows = TABLE.iter().flat_map(|(_, rows)| *rows);
             rows.clone().find(|row| row.entries.iter().any(|entry| entry.name == name)).copied().unwrap()
         };
-        let keys = super::super::keys_file::parse("undo = ['Z', 'F9']\nhud = []\nquit = []").unwrap();
+        let keys =
+            super::super::keys_file::parse("undo = ['Z', 'F9']\nredo = ['Ctrl+Y']\nhud = []\nquit = []")
+                .unwrap();
         let others = |name: &str| keys.other_keys_of(&row(name), &Letters::default());
         assert_eq!(others("up"), "PageUp PageDown");
         assert_eq!(others("front"), "Num1 Num3 Num7");

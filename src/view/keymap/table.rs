@@ -194,9 +194,15 @@ pub const TABLE: &[Section] = &[
                     again("more", Tap::More, &["Ctrl+ArrowRight"]),
                 ],
             ),
-            row("hide, show *", &[tap("hide", Tap::Hide, &["Delete"])]),
+            row("hide, show, with all below *", &[tap("hide", Tap::Hide, &["Delete"])]),
             row("duplicate *", &[tap("duplicate", Tap::Duplicate, &["Ctrl+D"])]),
-            row("undo *", &[again("undo", Tap::Undo, &["Backspace", "Ctrl+Z"])]),
+            row(
+                "undo, do again *",
+                &[
+                    again("undo", Tap::Undo, &["Backspace", "Ctrl+Z"]),
+                    again("redo", Tap::Redo, &["Ctrl+Y", "Ctrl+Shift+Z"]),
+                ],
+            ),
             row("save the edits as a settings file", &[tap("save_edits", Tap::SaveEdits, &["Ctrl+E"])]),
         ],
     ),

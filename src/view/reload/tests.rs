@@ -292,4 +292,11 @@ fn edits_are_saved_beside_the_scene_and_told_of_when_it_is_opened_again() {
     let with = stage.open("lone.obj", Wishes::default(), &settings);
     assert_eq!(identity(&with).scene_hash, identity(&app).scene_hash);
     assert!(!card(&with).contains("not applied"));
+    // The file itself means the same, but not where its scene is gone.
+    let opened = stage.open("lone.edits_2.toml", Wishes::default(), &LoadOptions::default());
+    assert_eq!(identity(&opened), identity(&with));
+    std::fs::remove_file(stage.0.join("lone.obj")).unwrap();
+    let source = SceneSource::File(saved[1].clone());
+    let alone = open(&source, &LoadOptions::default(), &Wishes::default()).err().unwrap().to_string();
+    assert!(alone.contains("no scene but what was edited in one"), "{alone}");
 }

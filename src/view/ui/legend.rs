@@ -2,13 +2,14 @@
 
 use super::super::pixel_view::Legend;
 use super::card;
-use super::style::{FAINT, MARGIN};
+use super::place::Place;
+use super::style::FAINT;
 use crate::report::false_color::COLORS;
-use egui::{Align2, Color32, Context, Mesh, Rect, RichText, Sense, Shape, Ui, pos2, vec2};
+use egui::{Color32, Context, Mesh, Rect, RichText, Sense, Shape, Ui, pos2, vec2};
 
-/// Shows the legend in the upper right corner.
-pub fn show(context: &Context, legend: &Legend) -> Rect {
-    card(context, "legend", (Align2::RIGHT_TOP, vec2(-MARGIN, MARGIN)), |ui| {
+/// Shows the legend.
+pub fn show(context: &Context, legend: &Legend, place: Place) -> Rect {
+    card(context, "legend", place, |ui| {
         ui.label(legend.title);
         if let Some(count) = &legend.count {
             ui.label(RichText::new(count).color(FAINT).small());

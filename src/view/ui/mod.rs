@@ -35,6 +35,8 @@ pub struct Content<'a> {
     pub measured: Measured,
     /// What is loading, while it is.
     pub loading: Option<&'a str>,
+    /// Somebody may not know where to find the keys.
+    pub hint: bool,
     /// A line that passes.
     pub notice: &'a str,
     /// Which other picture is shown, and up to which part of the width.
@@ -187,12 +189,19 @@ impl Ui {
         let is_asked = status.edit.is_some() || status.debug.is_open() || self.graph;
         let has_room = places.is_roomy() || !is_asked;
         if self.level != Level::None && has_room {
-            places.take(strip::show(context, status, content.measured, self.level));
+            let hint = content.hint.then(|| content.keys.fill("{help}: all keys", content.letters));
+            places.take(strip::show(context, status, content.measured, self.level, hint.as_deref()));
         } else if let Some(text) = altered(status) {
             places.take(strip::show_altered(context, &text));
         }
         if let Some(legend) = status.legend.as_ref().filter(|_| self.level != Level::None && has_room) {
-            places.take(legend::show(context, legend));
+            // Beside the status, or below it.
+            let place = if places.is_roomy() {
+                (Align2::RIGHT_TOP, vec2(-MARGIN, MARGIN))
+            } else {
+                (Align2::LEFT_BOTTOM, vec2(MARGIN, -MARGIN))
+            };
+            places.take(legend::show(context, legend, place));
         }
         if let Some((name, part)) = content.compared {
             let middle = places.room.center().x;

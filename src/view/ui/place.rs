@@ -4,7 +4,7 @@ use super::style::MARGIN;
 use egui::{Align2, Context, Id, Rect, Vec2, vec2};
 
 /// Windows with less, in points, show one card at a time.
-const ROOMY: Vec2 = vec2(320.0, 200.0);
+const ROOMY: Vec2 = vec2(520.0, 320.0);
 
 /// What is taken of the window, by cards in the order of their importance.
 pub struct Places {

@@ -5,6 +5,9 @@ use super::card;
 use super::style::{BRIGHT, CAUTION, FAINT, MARGIN};
 use egui::{Align2, Context, Grid, Rect, RichText, Ui, vec2};
 
+/// Below this width, points, values stand closer together and without what is beside them.
+const NARROW: f32 = 400.0;
+
 /// What has to be told although nothing is to be shown.
 pub fn show_altered(context: &Context, text: &str) -> Rect {
     card(context, "altered", (Align2::LEFT_TOP, vec2(MARGIN, MARGIN)), |ui| {
@@ -12,17 +15,31 @@ pub fn show_altered(context: &Context, text: &str) -> Rect {
     })
 }
 
-/// Shows the strip, and as much of the rest as `level` wants.
-pub fn show(context: &Context, status: &Status, measured: Measured, level: Level) -> Rect {
+/// Shows the strip, as much of the rest as `level` wants, and a `hint` for who is new here.
+pub fn show(
+    context: &Context,
+    status: &Status,
+    measured: Measured,
+    level: Level,
+    hint: Option<&str>,
+) -> Rect {
     card(context, "status", (Align2::LEFT_TOP, vec2(MARGIN, MARGIN)), |ui| {
         ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 18.0;
-            for cell in headline(status) {
+            // Of a small window it takes all of the width.
+            ui.spacing_mut().item_spacing.x = if ui.available_width() > NARROW { 18.0 } else { 8.0 };
+            let is_narrow = ui.available_width() <= NARROW;
+            for mut cell in headline(status) {
+                if is_narrow {
+                    cell.note.clear();
+                }
                 show_cell(ui, &cell);
             }
         });
         if let Some(text) = caution(status) {
             ui.label(RichText::new(text).color(CAUTION).small());
+        }
+        if let Some(hint) = hint {
+            ui.label(RichText::new(hint).color(FAINT).small());
         }
         let mut cells = Vec::new();
         if matches!(level, Level::Long | Level::All) {

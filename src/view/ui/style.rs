@@ -21,7 +21,7 @@ pub const CAUTION: Color32 = Color32::from_rgb(255, 122, 96);
 pub const LINE: Color32 = Color32::from_rgba_premultiplied(36, 36, 38, 40);
 
 /// Dark enough for white letters over a white wall.
-const CARD: Color32 = Color32::from_rgba_premultiplied(13, 14, 17, 214);
+const CARD: Color32 = Color32::from_rgba_premultiplied(14, 15, 18, 232);
 
 /// The ground that everything stands on.
 pub fn frame() -> Frame {

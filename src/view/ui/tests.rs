@@ -15,7 +15,16 @@ fn content<'a>(
     keys: &'a Keymap,
     letters: &'a Letters,
 ) -> Content<'a> {
-    Content { status, measured: Measured::default(), loading: None, notice, compared: None, keys, letters }
+    Content {
+        status,
+        measured: Measured::default(),
+        loading: None,
+        hint: false,
+        notice,
+        compared: None,
+        keys,
+        letters,
+    }
 }
 
 fn drawn(size: UVec2, display: f64, change: impl FnOnce(&mut Ui), background: u8) -> Vec<u8> {
