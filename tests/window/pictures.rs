@@ -9,6 +9,9 @@ fn screenshots_are_what_the_window_shows() {
     };
     let mut program = desktop.start(SMALL);
     desktop.wait_until_done(&mut program);
+    // The hint for who has not pressed a key yet is gone then.
+    desktop.xdotool(["key", "Shift_L"]);
+    pause(500);
     let with_text = desktop.shot(&program);
     let saved = |key: &str, count: usize| {
         desktop.xdotool(["key", key]);
@@ -215,6 +218,10 @@ fn edits_that_were_not_saved_travel_with_the_screenshot() {
     desktop.wait_until_done(&mut program);
     desktop.xdotool(["key", "ctrl+F12"]);
     let shot = wait_for("the file", || pictures_in(&desktop.directory).first().cloned());
+    assert!(desktop.title(&program).contains("* - "), "nothing says that edits are not saved");
+    desktop.xdotool(["key", "ctrl+q"]);
+    pause(1000);
+    assert!(program.is_alive(), "edits are lost without a word");
     desktop.xdotool(["key", "ctrl+q"]);
     assert_eq!(program.wait().code(), Some(0));
     let again = desktop.directory.join("again.png");
