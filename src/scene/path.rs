@@ -53,18 +53,10 @@ pub fn find(world: &World, path: &[String]) -> Option<Entity> {
 
 /// The children of `parent`, or all that have none, in the order in which they were made, by their labels.
 fn labels(world: &World, parent: Option<Entity>) -> Vec<(Entity, String)> {
-    let mut siblings: Vec<Entity> = match parent {
-        Some(parent) => world.get::<Children>(parent).map_or(Vec::new(), |c| c.iter().collect()),
-        // The window's own camera is not of the scene.
-        None => world
-            .iter_entities()
-            .filter(|e| {
-                e.contains::<super::Transform>() && !e.contains::<ChildOf>() && !e.contains::<Camera>()
-            })
-            .map(|e| e.id())
-            .collect(),
+    let siblings = match parent {
+        Some(parent) => children(world, parent),
+        None => roots(world),
     };
-    siblings.sort_by_key(|entity| entity.index_u32());
     let mut seen: HashMap<&str, usize> = HashMap::new();
     let label = |entity| {
         let name = world.get::<Name>(entity).map_or("", Name::as_str);
@@ -73,6 +65,23 @@ fn labels(world: &World, parent: Option<Entity>) -> Vec<(Entity, String)> {
         (entity, if *number == 1 { name.to_owned() } else { format!("{name}#{number}") })
     };
     siblings.into_iter().map(label).collect()
+}
+
+/// In the order in which they came to it, whichever numbers they have: those of what is gone are given again.
+#[must_use]
+pub fn children(world: &World, parent: Entity) -> Vec<Entity> {
+    world.get::<Children>(parent).map_or(Vec::new(), |children| children.iter().collect())
+}
+
+/// All of the scene that have no parent.
+fn roots(world: &World) -> Vec<Entity> {
+    // The window's own camera is not of the scene.
+    let is_root = |e: &EntityRef<'_>| {
+        e.contains::<super::Transform>() && !e.contains::<ChildOf>() && !e.contains::<Camera>()
+    };
+    let mut roots: Vec<Entity> = world.iter_entities().filter(is_root).map(|e| e.id()).collect();
+    roots.sort_by_key(|entity| entity.index_u32());
+    roots
 }
 
 #[cfg(test)]

@@ -1,18 +1,14 @@
-//! Places to look from: the file's cameras, the sides of the scene, bookmarks; and kinds of projection.
+//! Places to look from: the file's cameras and the sides of the scene; and kinds of projection.
 
 use super::controls::{Notice, Notices};
-use super::flags::absolute;
 use super::fly::{FlyCamera, FlyCameraState};
 use super::input::Input;
 use super::keymap::{Side, Tap};
 use super::orbit::{Navigation, pivot_depth};
-use crate::load::SceneSource;
-use crate::open::SceneOrigin;
 use crate::scene::{ActiveCamera, Camera, Lens, Projection, SceneBounds, Transform};
 use crate::trace::RenderSettings;
 use bevy_ecs::prelude::*;
-use glam::{DVec2, DVec3, UVec2};
-use std::collections::HashMap;
+use glam::{DVec2, UVec2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Which cameras of the file were looked through.
@@ -41,26 +37,6 @@ pub fn same_camera(from: &World, camera: Entity, to: &World) -> Option<Entity> {
         |world| file_cameras(world).into_iter().filter(move |&other| world.get::<Name>(other) == Some(name));
     let index = named(from).position(|other| other == camera)?;
     named(to).nth(index)
-}
-
-/// Places that the user remembers, of each scene that the window has shown.
-#[derive(Resource, Clone, Debug, Default)]
-pub struct Bookmarks(HashMap<String, [Option<Bookmark>; 9]>);
-
-/// By what a scene is known: one that is opened again, by whatever path, is the same.
-fn known_as(origin: Option<Res<SceneOrigin>>) -> String {
-    origin.map_or_else(String::new, |origin| match &origin.source {
-        SceneSource::File(path) => absolute(path),
-        other => other.to_string(),
-    })
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Bookmark {
-    camera: Camera,
-    transform: Transform,
-    lens: Option<Lens>,
-    pivot: DVec3,
 }
 
 /// Shows the file's next or previous camera, or the first one again.
@@ -205,61 +181,6 @@ pub fn change_lens(
             format!("lens radius {radius:.4}, sharp at {focus:.3} (F: at the cursor)")
         };
         notices.0.push(Notice::Text(said));
-    }
-}
-
-/// Goes to a bookmark.
-pub fn recall(
-    input: Res<Input>,
-    bookmarks: Res<Bookmarks>,
-    origin: Option<Res<SceneOrigin>>,
-    mut navigation: ResMut<Navigation>,
-    mut cameras: Query<(Entity, &mut Camera, &mut Transform, &mut FlyCameraState), With<FlyCamera>>,
-    mut commands: Commands,
-    mut notices: ResMut<Notices>,
-) {
-    let own = bookmarks.0.get(&known_as(origin)).copied().unwrap_or_default();
-    for press in &input.taps {
-        let Tap::Recall(number) = press.tap else { continue };
-        let Some(Some(bookmark)) = own.get(usize::from(number) - 1) else {
-            notices
-                .0
-                .push(Notice::Text(format!("bookmark {number} is empty: {{set_bookmark_{number}}} sets it")));
-            continue;
-        };
-        navigation.pivot = bookmark.pivot;
-        for (entity, mut camera, mut transform, mut state) in &mut cameras {
-            camera.set_if_neq(bookmark.camera);
-            transform.set_if_neq(bookmark.transform);
-            state.set_if_neq(FlyCameraState::of(bookmark.transform.0.matrix3));
-            match bookmark.lens {
-                Some(lens) => commands.entity(entity).insert(lens),
-                None => commands.entity(entity).remove::<Lens>(),
-            };
-        }
-    }
-}
-
-/// Sets a bookmark.
-pub fn remember(
-    input: Res<Input>,
-    active: Res<ActiveCamera>,
-    navigation: Res<Navigation>,
-    cameras: Query<(&Camera, &crate::scene::GlobalTransform, Option<&Lens>)>,
-    mut bookmarks: ResMut<Bookmarks>,
-    origin: Option<Res<SceneOrigin>>,
-    mut notices: ResMut<Notices>,
-) {
-    let scene = known_as(origin);
-    for press in &input.taps {
-        if let Tap::Remember(number) = press.tap
-            && let Ok((camera, pose, lens)) = cameras.get(active.0)
-        {
-            let transform = Transform(pose.0);
-            bookmarks.0.entry(scene.clone()).or_default()[usize::from(number) - 1] =
-                Some(Bookmark { camera: *camera, transform, lens: lens.copied(), pivot: navigation.pivot });
-            notices.0.push(Notice::Text(format!("bookmark {number} set")));
-        }
     }
 }
 

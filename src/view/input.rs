@@ -108,6 +108,7 @@ impl Tap {
         matches!(
             self,
             Self::Select
+                | Self::SelectParent
                 | Self::PreviousThing
                 | Self::NextThing
                 | Self::Escape

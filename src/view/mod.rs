@@ -5,6 +5,7 @@
 //! pictures the other way over a shared slot. What a key does stands in [`keymap`], and what it does
 //! to the world in [`fly`] and [`controls`].
 
+pub mod bookmarks;
 pub mod cameras;
 pub mod chord;
 pub mod controls;

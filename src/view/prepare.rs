@@ -1,8 +1,7 @@
 //! The window's resources and systems in a world, and what it says of itself.
 
-use super::cameras::{
-    Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
-};
+use super::bookmarks::{Bookmarks, recall, remember};
+use super::cameras::{FileCameras, change_lens, change_projection, choose_camera, choose_side};
 use super::controls::{
     Notices, Paused, change_display, change_pause, change_settings, change_shown, print_camera, save_picture,
 };

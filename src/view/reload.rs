@@ -1,6 +1,7 @@
 //! Another scene in the running window, or the same one again from its files.
 
-use super::cameras::{Bookmarks, FileCameras, same_camera};
+use super::bookmarks::Bookmarks;
+use super::cameras::{FileCameras, same_camera};
 use super::controls::Paused;
 use super::debug::Debug;
 use super::edit::carry::carry;

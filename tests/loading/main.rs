@@ -14,6 +14,7 @@ mod names;
 mod normal_maps;
 mod obj;
 mod obj_dialects;
+mod obj_parts;
 mod obj_wild;
 mod obj_words;
 mod settings;

@@ -141,6 +141,10 @@ fn bookmarks_bring_back_place_lens_and_projection() {
     // One that is set again is another.
     watched.keys(&["Return", "ctrl+shift+9", "Home", "shift+9"]);
     watched.shows("where the ninth is now", &[]);
+    // They outlive the window.
+    let watched = watched.again();
+    watched.keys(&["shift+1"]);
+    assert_eq!(watched.seen("the first, in another window"), first);
 }
 
 /// A triangle, and three cameras before it.

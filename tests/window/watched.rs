@@ -128,6 +128,17 @@ impl Watched {
         Some(watched)
     }
 
+    /// Closes the window and opens another one on the same scene.
+    pub fn again(mut self) -> Self {
+        self.keys(&["ctrl+q"]);
+        self.program.wait();
+        let scene = self.scene.iter().map(String::as_str);
+        let flags: Vec<&str> = scene.chain(["--no-kept-samples", "--no-smoothing"]).collect();
+        self.program = self.desktop.start_saying(&flags, &self.said);
+        self.desktop.hide_status(&mut self.program);
+        self
+    }
+
     /// Presses these keys, one after the other.
     pub fn keys(&self, keys: &[&str]) {
         self.desktop.xdotool([&["key"], keys].concat());

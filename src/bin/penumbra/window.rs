@@ -21,6 +21,7 @@ pub fn run(args: &WindowArgs) -> u8 {
 
 #[cfg(feature = "view")]
 pub fn run(args: &WindowArgs) -> u8 {
+    use penumbra::view::bookmarks::{self, Bookmarks};
     use penumbra::view::{ViewError, ViewOptions};
     let source = match args.scene.source() {
         Ok(source) => source,
@@ -64,6 +65,10 @@ pub fn run(args: &WindowArgs) -> u8 {
         record,
         exit_after: None,
     };
+    let (bookmarks, wrong) = bookmarks::default_path().map(Bookmarks::kept_in).unwrap_or_default();
+    if let Some(why) = wrong {
+        eprintln!("warning: no bookmarks: {why}");
+    }
     let mut load = args.scene.load_options();
     let (only_film, never_smooth) = (args.no_kept_samples, args.no_smoothing);
     let opened = penumbra::view::run(options, move |watcher| {
@@ -82,6 +87,7 @@ pub fn run(args: &WindowArgs) -> u8 {
                 let mut budget = opened.app.world.resource_mut::<FrameBudget>();
                 budget.sample_target = opened.samples.unwrap_or(WINDOW_SAMPLES);
                 budget.adaptive = opened.samples.is_none() && !even;
+                opened.app.world.insert_resource(bookmarks);
                 Ok(opened.app)
             }
             Err(error) => Err(error.to_string()),

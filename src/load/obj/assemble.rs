@@ -10,12 +10,13 @@ use std::collections::HashMap;
 /// Vertices at one position that are looked at to find a twin.
 const MOST_STEPS: usize = 64;
 
-/// Cuts all faces into triangles; corners that agree in everything share a vertex.
-pub(super) fn mesh(raw: &Raw) -> TriangleMesh {
+/// Cuts all faces into triangles; corners that agree in everything share a vertex. For each triangle what `parts` says of its face.
+pub(super) fn mesh(raw: &Raw, parts: &[u32]) -> (TriangleMesh, Vec<u32>) {
     let normals = Normals::new(raw);
     let mut vertices = Vertices::new(raw, &normals);
     let mut corners: Vec<u32> = Vec::new();
     let mut points: Vec<DVec3> = Vec::new();
+    let mut part_of = Vec::new();
     let several_materials = raw.materials.len() > 1;
     for (i, face) in raw.faces.iter().enumerate() {
         corners.clear();
@@ -31,8 +32,11 @@ pub(super) fn mesh(raw: &Raw) -> TriangleMesh {
         if several_materials {
             vertices.mesh.slots.resize(vertices.mesh.triangles.len(), face.material);
         }
+        if let Some(&part) = parts.get(i) {
+            part_of.resize(vertices.mesh.triangles.len(), part);
+        }
     }
-    vertices.mesh
+    (vertices.mesh, part_of)
 }
 
 /// The normals of the file and, after them, those that are made here.

@@ -5,11 +5,11 @@
 //! `tobj`, after [`tidy`] has checked and tidied their statements one by one (it panics on a colour
 //! of two numbers, and one bad statement would lose the whole library).
 //!
-//! Rules where the format leaves a choice: the whole file is one [`Mesh`] and one [`Instance`];
-//! `usemtl` may change with every face; polygons are cut into `n - 2` triangles in their own plane;
+//! Rules where the format leaves a choice: each object (`o`) or, where no two have faces, each group (`g`) is a [`Mesh`] and
+//! an [`Instance`] of its own, unless they are very many ([`parts`]); `usemtl` may change with every face; polygons are cut into `n - 2` triangles in their own plane;
 //! without normals a face is flat unless a smoothing group (`s`) says otherwise; texture
 //! coordinates are turned from bottom-left to top-left; a face with a vertex spelled `nan` or `inf`
-//! is refused with its line, one with a number too large is dropped with a warning; `g`, `o`, points, lines and free-form
+//! is refused with its line, one with a number too large is dropped with a warning; points, lines and free-form
 //! statements are skipped.
 
 mod assemble;
@@ -18,6 +18,7 @@ mod lines;
 mod map;
 mod mtl;
 mod numbers;
+mod parts;
 mod polygon;
 mod raw;
 mod relief;
@@ -32,7 +33,7 @@ use super::report::{Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
 use super::tangents;
-use crate::scene::{Instance, Material, Mesh, Transform};
+use crate::scene::{Instance, Material, Mesh, Transform, TriangleMesh};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3, Vec3};
@@ -82,22 +83,47 @@ pub(super) fn load(
         .map(|name| material_entity(file, name.as_deref(), &library, &plain, overrides, sink))
         .collect();
     sink.begin(Phase::Meshes);
-    let mut done = geometry::finish(assemble::mesh(&raw), false, |_| true);
-    tangents::complete_for(&mut done.mesh, &materials, file, "", sink);
-    done.mended.tell(file, "", sink);
+    // What one moves by hand is the model, wherever its file has it.
+    let holder = if raw.origin == DVec3::ZERO {
+        root
+    } else {
+        let place = Transform(DAffine3::from_translation(raw.origin));
+        sink.spawn((Name::new("place"), place, ChildOf(root)))
+    };
+    let (parts, names) = parts::parts(&raw.objects, &raw.groups, raw.faces.len()).unwrap_or_default();
+    let (whole, part) = assemble::mesh(&raw, &parts);
+    if part.is_empty() {
+        if let Some(what) = parts::told(&raw.objects, &raw.groups) {
+            sink.decide(file, what);
+        }
+        spawn(file, "", whole, materials, holder, sink);
+        return Ok(());
+    }
+    for ((mesh, slots), name) in parts::split(&whole, &part, names.len()).into_iter().zip(names) {
+        let materials = slots.iter().map(|&slot| materials[usize::from(slot)]).collect();
+        let thing = sink.spawn((Name::new(name.clone()), Transform::default(), ChildOf(holder)));
+        spawn(file, &name, mesh, materials, thing, sink);
+    }
+    Ok(())
+}
+
+/// Puts `mesh` on `holder`, if there is anything of it to see.
+fn spawn(
+    file: &str,
+    place: &str,
+    mesh: TriangleMesh,
+    materials: Vec<Entity>,
+    holder: Entity,
+    sink: &mut Sink<'_>,
+) {
+    let mut done = geometry::finish(mesh, false, |_| true);
+    tangents::complete_for(&mut done.mesh, &materials, file, place, sink);
+    done.mended.tell(file, place, sink);
     sink.report.triangles += done.triangles;
     if !done.mesh.triangles.is_empty() {
         let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
-        // What one moves by hand is the model, wherever its file has it.
-        let holder = if raw.origin == DVec3::ZERO {
-            root
-        } else {
-            let place = Transform(DAffine3::from_translation(raw.origin));
-            sink.spawn((Name::new("place"), place, ChildOf(root)))
-        };
         sink.world.entity_mut(holder).insert(Instance { mesh, materials });
     }
-    Ok(())
 }
 
 /// Materials by their names, and by what is left of these where people are less exact; the first of each counts.

@@ -2,6 +2,7 @@
 
 use super::lines::{POLYPAINT, Statement, unquoted};
 use super::numbers::{NONE, bytes_of, numbers, resolve, shorten};
+use super::parts::Names;
 use crate::bvh::MOST_TRIANGLES;
 use crate::load::error::LoadError;
 use crate::load::report::{Kind, Sink};
@@ -65,6 +66,10 @@ pub(super) struct Raw {
     /// Names that faces use; None for faces before the first `usemtl`.
     pub(super) materials: Vec<Option<String>>,
     pub(super) libraries: Vec<String>,
+    /// What `o` says ...
+    pub(super) objects: Names,
+    /// ... and `g`.
+    pub(super) groups: Names,
     /// By name the index in `materials`.
     slots: HashMap<Option<String>, u16>,
     /// Of the faces to come.
@@ -100,7 +105,8 @@ impl Raw {
             }
             "mtllib" => self.libraries.push(statement.rest.to_owned()),
             "s" => self.group = group_of(statement.rest),
-            "g" | "o" => {}
+            "o" => self.objects.begin(unquoted(statement.rest), self.faces.len()),
+            "g" => self.groups.begin(statement.rest, self.faces.len()),
             "p" => self.skip(Skipped::Points, statement.line),
             "l" => self.skip(Skipped::Lines, statement.line),
             "vp" | "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim"

@@ -4,8 +4,8 @@ use super::{Check, Settings};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::load::{LoadOptions, LoadReport, pose};
-use crate::scene::path::find;
-use crate::scene::{Glossy, Hidden, Instance, Light, Material, Transform};
+use crate::scene::path::{children, find};
+use crate::scene::{Glossy, Hidden, Instance, Light, Material, Transform, Visible};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, DVec4, Vec3};
@@ -22,7 +22,7 @@ pub struct EditTable {
     /// Names from the root down: see [`crate::scene::path`]. Empty: no thing is meant.
     #[serde(default)]
     pub entity: Vec<String>,
-    /// It is made first, as a copy of this one, beside it.
+    /// It is made first, as a copy of this one and of all that moves with it, beside it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copy_of: Option<Vec<String>>,
     /// Its placement in its parent, rows first.
@@ -291,21 +291,21 @@ fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -
             sink.ignored(&settings.file, &place, "there is no such thing in the scene");
         }
         Ok(Changed::Old) => {}
-        Ok(Changed::New(copy)) => sink.note_spawned(copy),
+        Ok(Changed::New(copies)) => copies.into_iter().for_each(|(_, copy)| sink.note_spawned(copy)),
         Err(problem) => return Err(settings.broken(table, &format!("[[edit]] of \"{path}\""), problem)),
     }
     Ok(())
 }
 
 /// What an edit was about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Changed {
     /// Something that is not there.
     Nothing,
     /// Something that was there.
     Old,
-    /// This copy.
-    New(Entity),
+    /// A copy: what it is of and itself, and so for all that moves with it. See [`duplicate`].
+    New(Vec<(Entity, Entity)>),
 }
 
 /// Changes the world as `edit` says.
@@ -332,8 +332,8 @@ pub fn change(world: &mut World, edit: &EditTable) -> Result<Changed, String> {
     let (entity, changed) = match &edit.copy_of {
         Some(original) => match find(world, original) {
             Some(original) => {
-                let copy = duplicate(world, original, name);
-                (copy, Changed::New(copy))
+                let copies = duplicate(world, original, name);
+                (copies[0].1, Changed::New(copies))
             }
             None => return Ok(Changed::Nothing),
         },
@@ -366,14 +366,36 @@ pub fn change(world: &mut World, edit: &EditTable) -> Result<Changed, String> {
     check.problem.map_or(Ok(changed), Err)
 }
 
-/// Spawns another instance or light like `original`, beside it, called `name`.
-pub fn duplicate(world: &mut World, original: Entity, name: &str) -> Entity {
+/// Spawns another like `original`, beside it and called `name`, with all that moves with it: each of them and its copy, parents
+/// before their children.
+pub fn duplicate(world: &mut World, original: Entity, name: &str) -> Vec<(Entity, Entity)> {
     let parent = world.get::<ChildOf>(original).map(ChildOf::parent);
+    // A copy is seen; but what is left out of a thing that is seen, its copy is without, too.
+    let is_hidden = world.get::<Hidden>(original).is_some();
+    let top = twin(world, original, Name::new(name.to_owned()), parent);
+    let mut copies = vec![(original, top)];
+    let mut next = 0;
+    while let Some(&(above, copy_above)) = copies.get(next) {
+        next += 1;
+        for child in children(world, above).into_iter().filter(|&child| child != top) {
+            let name = world.get::<Name>(child).cloned().unwrap_or_default();
+            let copy = twin(world, child, name, Some(copy_above));
+            if !is_hidden && world.get::<Hidden>(child).is_some() {
+                world.entity_mut(copy).insert(Hidden);
+            }
+            copies.push((child, copy));
+        }
+    }
+    copies
+}
+
+/// Another one like it, without its children.
+fn twin(world: &mut World, original: Entity, name: Name, parent: Option<Entity>) -> Entity {
     let place = world.get::<Transform>(original).copied().unwrap_or_default();
     let instance = world.get::<Instance>(original).cloned();
     let light = world.get::<Light>(original).cloned();
-    let visible = world.get::<crate::scene::Visible>(original).copied();
-    let mut copy = world.spawn((Name::new(name.to_owned()), place));
+    let visible = world.get::<Visible>(original).copied();
+    let mut copy = world.spawn((name, place));
     if let Some(instance) = instance {
         copy.insert(instance);
     }

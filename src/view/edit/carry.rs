@@ -1,7 +1,7 @@
 //! Edits outlive their world: the scene loaded again is edited as it was, and undoing leads to what its files say now.
 
 use super::save::tables;
-use super::undo::{Undo, remember};
+use super::undo::remember;
 use super::{Editor, Selection};
 use crate::load::settings::edit::{Changed, EditTable, change};
 use crate::scene::path::{find, path_of};
@@ -37,9 +37,7 @@ fn edit_again(world: &mut World, editor: &mut Editor, table: EditTable) {
         editor.note(selection);
     }
     // What does not fit any more, such as the sizes of another kind of light, is as the files say.
-    if let Ok(Changed::New(entity)) = change(world, &table) {
-        editor.copies.push((entity, original));
-        let made = Undo::of_copy(world, Selection { entity, slot }, selection);
-        editor.undo.push(made);
+    if let Ok(Changed::New(copies)) = change(world, &table) {
+        editor.made(world, &copies, slot);
     }
 }

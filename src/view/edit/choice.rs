@@ -1,8 +1,8 @@
 //! Which thing is edited: the one under the cursor, or the next one in order.
 
 use super::super::orbit::ray_through;
-use super::Selection;
 use super::marks::ends_of;
+use super::{Selection, below};
 use crate::bvh::Ray;
 use crate::scene::{GlobalTransform, Hidden, Instance, Light, Visible};
 use crate::sync::{self, Entities, RenderOrigin};
@@ -87,12 +87,18 @@ fn distance(point: Vec2, [a, b]: [Vec2; 2]) -> f32 {
     point.distance(a + along * part)
 }
 
-/// What kind of light it is; or which material of an instance that has several is meant.
+/// What kind of light it is; which material of an instance that has several is meant; or how many things a group has.
 pub(super) fn kind_of(world: &World, Selection { entity, slot }: Selection) -> Option<String> {
     if let Some(light) = world.get::<Light>(entity) {
         return Some(light_kind(light).to_owned());
     }
-    let materials = &world.get::<Instance>(entity)?.materials;
+    let Some(instance) = world.get::<Instance>(entity) else {
+        return Some(match below(world, entity).len() {
+            1 => "group of 1 thing".to_owned(),
+            count => format!("group of {count} things"),
+        });
+    };
+    let materials = &instance.materials;
     let name = materials.get(slot).and_then(|&material| world.get::<Name>(material));
     let name = name.map_or_else(|| format!("material {}", slot + 1), |name| name.as_str().to_owned());
     (materials.len() > 1).then_some(name)

@@ -11,6 +11,8 @@ use glam::{DAffine3, UVec2, Vec3};
 
 /// Pixels from the middle of a mark to its corners.
 const RADIUS: f32 = 5.0;
+/// Of a group with more things only so many are marked.
+const MOST_BOXES: usize = 256;
 const SELECTED: [u8; 3] = [255, 190, 92];
 const OTHER: [u8; 3] = [104, 208, 232];
 
@@ -19,7 +21,7 @@ const OTHER: [u8; 3] = [104, 208, 232];
 pub struct Marks {
     /// Lamps from end to end, and their colours.
     lamps: Vec<([Vec3; 2], [u8; 3])>,
-    /// Around the selected instance.
+    /// Around the selected instance, or those of a group.
     around: Vec<Line>,
 }
 
@@ -70,19 +72,26 @@ pub fn mark(
     geometry: Res<Geometry>,
     entities: Res<Entities>,
     lamps: Query<(Entity, &Light, &GlobalTransform, Option<&Visible>)>,
+    parents: Query<&ChildOf>,
     mut marks: ResMut<Marks>,
 ) {
     let mut wanted = Marks::default();
     if let Some(selected) = editor.selected.map(|selection| selection.entity) {
+        // What is selected; if that is a group, all in it.
+        let is_group = !lamps.contains(selected) && !entities.instances.contains(&selected);
+        let is_of = |top: Entity, entity: Entity| {
+            entity == top || (is_group && parents.iter_ancestors(entity).any(|above| above == top))
+        };
         for (entity, light, global, visible) in &lamps {
-            let is_selected = entity == selected;
+            let is_selected = is_of(selected, entity);
             let visible = if is_selected { Some(&Visible(false)) } else { visible };
             if let Some(ends) = ends_of(light, visible, &origin.render_from(global)) {
                 wanted.lamps.push((ends, if is_selected { SELECTED } else { OTHER }));
             }
         }
-        let instance = entities.instances.iter().position(|&instance| instance == selected);
-        if let Some(placement) = instance.and_then(|i| geometry.tlas.placements().get(i)) {
+        let instances = entities.instances.iter().zip(geometry.tlas.placements());
+        let ours = instances.filter(|(instance, _)| is_of(selected, **instance));
+        for (_, placement) in ours.take(MOST_BOXES) {
             let placed = Placed { bounds: placement.blas().bounds(), placement: Some(placement) };
             wanted.around.extend(placed.lines(SELECTED, 0.6));
         }

@@ -12,7 +12,7 @@ use super::input::Input;
 use super::keymap::Tap;
 use crate::app::FrameStats;
 use crate::load::settings::edit::{EditTable, duplicate};
-use crate::scene::path::path_of;
+use crate::scene::path::{children, path_of};
 use crate::scene::{Hidden, Instance, Light, Playing, SceneBounds};
 use crate::sync::Redone;
 use crate::trace::Lights;
@@ -67,9 +67,9 @@ struct Selection {
 pub struct EditStatus {
     /// Its name.
     pub name: String,
-    /// What kind of light it is; or which of its materials is meant, if it has several.
+    /// What kind of light it is; which of its materials is meant, if it has several; or how large a group.
     pub kind: Option<String>,
-    /// The how manieth of how many things it is, in the order of the keys.
+    /// The how manieth of how many things it is, in the order of the keys; a group is the zeroth.
     pub place: [usize; 2],
     /// Its numbers.
     pub rows: Vec<Row>,
@@ -118,6 +118,25 @@ impl Editor {
             self.edited.push((entity, slot));
         }
     }
+
+    /// That these copies were made, and how to have them no more.
+    fn made(&mut self, world: &World, copies: &[(Entity, Entity)], slot: usize) -> Selection {
+        let [original, copied] = [copies[0].0, copies[0].1].map(|entity| Selection { entity, slot });
+        self.copies.push((copied.entity, original.entity));
+        let copies = copies.iter().map(|&(_, copy)| copy).collect();
+        self.undo.push(Undo { copies, ..Undo::of_copy(world, copied, original) });
+        copied
+    }
+
+    /// That they are not what the files have: the first has another place, others are copies of what was changed before.
+    fn note_copies(&mut self, copies: &[(Entity, Entity)]) {
+        let edited: Vec<Entity> = self.edited.iter().map(|&(entity, _)| entity).collect();
+        for (n, &(of, copy)) in copies.iter().enumerate() {
+            if n == 0 || edited.contains(&of) {
+                self.note(Selection { entity: copy, slot: 0 });
+            }
+        }
+    }
 }
 
 /// Acts on keys and on the card.
@@ -138,6 +157,7 @@ pub fn edit_scene(world: &mut World) {
         let steps = if press.shift { 10.0 } else { 1.0 };
         match press.tap {
             Tap::Select => select(world, &mut editor, press.cursor),
+            Tap::SelectParent => select_parent(world, &mut editor),
             Tap::PreviousThing => go(world, &mut editor, -steps as i64),
             Tap::NextThing => go(world, &mut editor, steps as i64),
             Tap::Escape => editor.selected = None,
@@ -197,6 +217,17 @@ fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
     }
 }
 
+/// Selects what the selected thing moves with: a group of the file, in the end all of it.
+fn select_parent(world: &mut World, editor: &mut Editor) {
+    let Some(selection) = selected(world, editor) else { return };
+    let Some(parent) = world.get::<ChildOf>(selection.entity).map(ChildOf::parent) else {
+        return say(world, "it moves with nothing else");
+    };
+    editor.row = 0;
+    editor.redone.clear();
+    editor.selected = Some(Selection { entity: parent, slot: 0 });
+}
+
 fn go(world: &mut World, editor: &mut Editor, by: i64) {
     editor.row = 0;
     editor.redone.clear();
@@ -249,13 +280,12 @@ fn hide(world: &mut World, editor: &mut Editor) {
 
 /// All things and lights below an entity.
 fn below(world: &World, top: Entity) -> Vec<Entity> {
-    let children = |entity| world.get::<Children>(entity).map_or(&[][..], |children| children);
-    let (mut found, mut next) = (Vec::new(), children(top).to_vec());
+    let (mut found, mut next) = (Vec::new(), children(world, top));
     while let Some(entity) = next.pop() {
         if world.get::<Instance>(entity).is_some() || world.get::<Light>(entity).is_some() {
             found.push(entity);
         }
-        next.extend(children(entity));
+        next.extend(children(world, entity));
     }
     found
 }
@@ -264,20 +294,18 @@ fn copy(world: &mut World, editor: &mut Editor) {
     let Some(selection) = selected(world, editor) else { return };
     let path = path_of(world, selection.entity);
     let name = format!("{} copy {}", path.last().map_or("", String::as_str), editor.copies.len() + 1);
-    let copy = duplicate(world, selection.entity, &name);
+    let copies = duplicate(world, selection.entity, &name);
     crate::app::propagate(world);
-    editor.copies.push((copy, selection.entity));
-    let copied = Selection { entity: copy, slot: selection.slot };
     editor.redo.clear();
-    editor.undo.push(Undo::of_copy(world, copied, selection));
+    let copied = editor.made(world, &copies, selection.slot);
+    editor.note_copies(&copies);
     editor.selected = Some(copied);
     // Beside the original, not in it.
-    let rows = rows(world, copy, 0, radius(world));
+    let rows = rows(world, copied.entity, 0, radius(world));
     let aside = rows.iter().find(|row| row.property == Property::Position(0));
     if let Some(x) = aside.map(|row| row.stepped(5.0)) {
-        set(world, copy, copied.slot, Property::Position(0), x);
+        set(world, copied.entity, copied.slot, Property::Position(0), x);
     }
-    editor.note(copied);
 }
 
 /// Before the arrays are brought up to date.

@@ -11,6 +11,7 @@ use crate::scene::{Hidden, Light, Material, Transform};
 use crate::sync::RenderOrigin;
 use bevy_ecs::prelude::*;
 use serde::Serialize;
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -32,9 +33,10 @@ pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
         ..EditTable::default()
     }));
     tables.extend(editor.waiting.iter().cloned());
+    let copied: HashSet<Entity> = editor.undo.iter().flat_map(|undo| undo.copies.iter().copied()).collect();
     for &(entity, slot) in &editor.edited {
         // What is as it was stays whatever the scene's files will say of it. But copies are made of things not edited yet.
-        let is_copy = editor.copies.iter().any(|&(copy, _)| copy == entity);
+        let is_copy = copied.contains(&entity);
         let mut past = editor.undo.iter().filter(|undo| undo.original.is_none() && !is_copy);
         let before = past.clone().find(|undo| undo.selection.entity == entity);
         let of_slot = past.find(|undo| undo.selection == Selection { entity, slot });

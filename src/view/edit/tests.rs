@@ -6,7 +6,7 @@ use crate::app::{App, FrameBudget, FrameSystems};
 use crate::farm::Identity;
 use crate::load::{LoadOptions, SceneSource};
 use crate::open::{Wishes, open};
-use crate::scene::{GlobalTransform, Light};
+use crate::scene::{GlobalTransform, Light, Transform};
 use crate::sync::RenderOrigin;
 use crate::trace::{Film, RenderSettings, Viewpoint};
 use glam::UVec2;
@@ -223,6 +223,88 @@ fn a_thing_is_hidden_with_all_below_it() {
     assert_eq!(hidden(&app), [true; 2]);
     press(&mut app, Tap::Hide, [0.5; 2]);
     assert_eq!(hidden(&app), [false; 2]);
+}
+
+/// What belongs together is moved as one, and saved so.
+#[test]
+fn a_group_is_selected_by_what_is_in_it() {
+    let mut app = editable("cornell");
+    let mut instances = app.world.query_filtered::<Entity, With<Instance>>();
+    let thing = instances.iter(&app.world).next().unwrap();
+    let lamp = app.world.query_filtered::<Entity, With<Light>>().iter(&app.world).next().unwrap();
+    let group = app.world.spawn((Name::new("group"), Transform::default())).id();
+    for entity in [thing, lamp] {
+        app.world.entity_mut(entity).insert(ChildOf(group));
+    }
+    app.frame();
+    let place = |app: &App, entity| app.world.get::<GlobalTransform>(entity).unwrap().0.translation;
+    let before = [thing, lamp].map(|entity| place(&app, entity));
+    app.world.resource_mut::<Editor>().selected = Some(Selection { entity: lamp, slot: 0 });
+    press(&mut app, Tap::SelectParent, [0.5; 2]);
+    let shown = status(&app);
+    assert_eq!((shown.name.as_str(), shown.place[0]), ("group", 0));
+    assert_eq!(shown.kind.as_deref(), Some("group of 2 things"));
+    press(&mut app, Tap::More, [0.5; 2]);
+    let moved = place(&app, group);
+    assert!(moved.length() > 0.0);
+    assert_eq!([thing, lamp].map(|entity| place(&app, entity) - moved), before);
+    let tables = save::tables(&app.world, app.world.resource::<Editor>());
+    assert!(tables.iter().any(|table| table.entity == ["group"] && table.matrix.is_some()));
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    assert_eq!([thing, lamp].map(|entity| place(&app, entity)), before);
+    press(&mut app, Tap::SelectParent, [0.5; 2]);
+    assert_eq!(status(&app).name, "group", "nothing is above it");
+    let said = app.world.resource::<Notices>().0.last().cloned();
+    assert_eq!(said, Some(Notice::Text("it moves with nothing else".to_owned())));
+}
+
+/// What moves with a thing is copied with it, changed and hidden as it is; undone, done again, saved.
+#[test]
+fn a_thing_is_copied_with_all_below_it() {
+    let mut app = editable("cornell");
+    let mut instances = app.world.query_filtered::<Entity, With<Instance>>();
+    let top = instances.iter(&app.world).next().unwrap();
+    let lamp = app.world.query_filtered::<Entity, With<Light>>().iter(&app.world).next().unwrap();
+    app.world.entity_mut(lamp).insert(ChildOf(top));
+    app.frame();
+    let lights = |app: &App| app.world.resource::<Lights>().len();
+    let of = |entity| Selection { entity, slot: 0 };
+    let before = lights(&app);
+    // A changed lamp ...
+    app.world.resource_mut::<Editor>().selected = Some(of(lamp));
+    press(&mut app, Tap::More, [0.5; 2]);
+    app.world.resource_mut::<Editor>().selected = Some(of(top));
+    press(&mut app, Tap::Duplicate, [0.5; 2]);
+    assert_eq!(lights(&app), 2 * before);
+    let copy = app.world.resource::<Editor>().selected.unwrap().entity;
+    let copied_lamp = children(&app.world, copy)[0];
+    let place = |app: &App, entity| *app.world.get::<Transform>(entity).unwrap();
+    assert_eq!(place(&app, copied_lamp), place(&app, lamp));
+    // ... is the same in the file, which knows it by its name.
+    let path = path_of(&app.world, copied_lamp);
+    let tables = save::tables(&app.world, app.world.resource::<Editor>());
+    let table = tables.iter().find(|table| table.entity == path).expect("written");
+    assert!(table.matrix.is_some() && table.light.is_some(), "{table:?}");
+    // The copied lamp is changed, and all of it undone and done again.
+    app.world.resource_mut::<Editor>().selected = Some(of(copied_lamp));
+    press(&mut app, Tap::Hide, [0.5; 2]);
+    assert_eq!(lights(&app), before);
+    let written = app.world.resource::<Editor>().written().to_owned();
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    assert_eq!(lights(&app), before);
+    assert!(app.world.get_entity(copied_lamp).is_err());
+    press(&mut app, Tap::Redo, [0.5; 2]);
+    assert_eq!(lights(&app), 2 * before);
+    press(&mut app, Tap::Redo, [0.5; 2]);
+    assert_eq!(lights(&app), before);
+    assert_eq!(app.world.resource::<Editor>().written(), written);
+    // A copy of what has something hidden has that hidden.
+    press(&mut app, Tap::PreviousThing, [0.5; 2]);
+    let copy = app.world.resource::<Editor>().copies[0].0;
+    app.world.resource_mut::<Editor>().selected = Some(of(copy));
+    press(&mut app, Tap::Duplicate, [0.5; 2]);
+    assert_eq!(lights(&app), before);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::load::settings::edit::duplicate;
 use crate::scene::path::path_of;
 use crate::scene::{Hidden, Light, Material, Pose, Transform};
 use bevy_ecs::prelude::*;
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 /// Changes of a number within this time of each other are one step.
@@ -17,6 +18,8 @@ pub(super) struct Undo {
     pub(super) selection: Selection,
     /// If it is a copy, what that is of.
     pub(super) original: Option<Selection>,
+    /// And all that was copied with it, itself first, parents before their children.
+    pub(super) copies: Vec<Entity>,
     /// Changes of one number in a row are one step ...
     pub(super) property: Option<Property>,
     /// ... if they follow each other soon.
@@ -41,6 +44,7 @@ impl Undo {
         Self {
             selection,
             original: None,
+            copies: Vec::new(),
             property: None,
             at: Instant::now(),
             transform: world.get::<Transform>(entity).copied(),
@@ -118,11 +122,15 @@ pub(super) fn undo(world: &mut World, editor: &mut Editor) {
     let Some(mut last) = editor.undo.pop() else { return say(world, "nothing to undo") };
     loop {
         let (selection, joined) = (last.selection, last.joined);
-        let now = Undo { original: last.original, joined, ..Undo::now(world, selection) };
+        let copies = last.copies.clone();
+        let now = Undo { original: last.original, copies, joined, ..Undo::now(world, selection) };
         if let Some(original) = last.original {
             editor.copies.retain(|(copy, _)| *copy != selection.entity);
-            editor.edited.retain(|(edited, _)| *edited != selection.entity);
-            world.despawn(selection.entity);
+            editor.edited.retain(|(edited, _)| !last.copies.contains(edited));
+            // From below: a deep chain needs no deep stack.
+            for &copy in last.copies.iter().rev() {
+                world.despawn(copy);
+            }
             editor.selected = Some(original);
         } else {
             last.apply(world);
@@ -147,8 +155,6 @@ pub(super) fn redo(world: &mut World, editor: &mut Editor) {
     loop {
         if let Some(original) = next.original {
             next.selection = copy_again(world, editor, &next, original);
-            let made = Undo { joined: next.joined, ..Undo::of_copy(world, next.selection, original) };
-            editor.undo.push(made);
         } else {
             editor.undo.push(Undo { joined: next.joined, ..Undo::now(world, next.selection) });
         }
@@ -165,17 +171,19 @@ pub(super) fn redo(world: &mut World, editor: &mut Editor) {
     crate::app::propagate(world);
 }
 
-/// A copy that was there before; what is said of that one is meant of it.
+/// Copies that were there before; what is said of those is meant of them.
 fn copy_again(world: &mut World, editor: &mut Editor, before: &Undo, original: Selection) -> Selection {
-    let copy = duplicate(world, original.entity, &before.name);
-    editor.copies.push((copy, original.entity));
-    let old = before.selection.entity;
+    let copies = duplicate(world, original.entity, &before.name);
+    let copied = editor.made(world, &copies, before.selection.slot);
+    editor.note_copies(&copies);
+    let now_called: HashMap<Entity, Entity> =
+        before.copies.iter().copied().zip(copies.into_iter().map(|(_, copy)| copy)).collect();
     for later in &mut editor.redo {
-        for selection in [Some(&mut later.selection), later.original.as_mut()].into_iter().flatten() {
-            if selection.entity == old {
-                selection.entity = copy;
-            }
+        let selections = [Some(&mut later.selection), later.original.as_mut()];
+        let entities = selections.into_iter().flatten().map(|selection| &mut selection.entity);
+        for entity in entities {
+            *entity = now_called.get(entity).copied().unwrap_or(*entity);
         }
     }
-    Selection { entity: copy, ..before.selection }
+    copied
 }

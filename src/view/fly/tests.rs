@@ -1,8 +1,7 @@
 //! Flying, and what other keys do to the camera.
 
-use super::super::cameras::{
-    Bookmarks, FileCameras, change_lens, change_projection, choose_camera, choose_side, recall, remember,
-};
+use super::super::bookmarks::{Bookmarks, recall, remember};
+use super::super::cameras::{FileCameras, change_lens, change_projection, choose_camera, choose_side};
 use super::super::input::{Command, Press};
 use super::super::keymap::Side;
 use super::super::orbit::{focus, orbit_camera};

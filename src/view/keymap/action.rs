@@ -121,6 +121,8 @@ pub enum Tap {
     Order,
     /// Edit what is under the cursor.
     Select,
+    /// Edit what it moves with.
+    SelectParent,
     /// Edit the thing before, in the order of all things.
     PreviousThing,
     /// Edit the next thing.

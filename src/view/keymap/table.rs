@@ -173,6 +173,7 @@ pub const TABLE: &[Section] = &[
         "Editing",
         &[
             row("select what is under the cursor", &[tap("select", Tap::Select, &["M"])]),
+            row("what it moves with", &[tap("select_parent", Tap::SelectParent, &["Shift+M"])]),
             row(
                 "thing before, after; lights first (Shift: ten)",
                 &[

@@ -52,7 +52,9 @@ pub fn show(
                 if let Some(kind) = &status.kind {
                     ui.label(RichText::new(legible(context, kind)).small());
                 }
-                ui.label(RichText::new(format!("{here} of {all}")).color(FAINT).small());
+                if here > 0 {
+                    ui.label(RichText::new(format!("{here} of {all}")).color(FAINT).small());
+                }
                 if status.hidden {
                     ui.label(RichText::new("hidden").color(CAUTION).small());
                 }

@@ -21,6 +21,8 @@ pub struct Prompt {
     cursor: usize,
     /// What it could become.
     names: Vec<String>,
+    /// Which of these the arrows went to.
+    chosen: Option<usize>,
     /// Why the last key came to nothing.
     said: String,
 }
@@ -58,6 +60,16 @@ impl Prompt {
     pub fn key(&mut self, code: KeyCode, text: Option<&str>, control: bool) -> Typed {
         self.said.clear();
         match code {
+            KeyCode::ArrowDown => return self.choose(1),
+            KeyCode::ArrowUp => return self.choose(-1),
+            KeyCode::Escape if self.chosen.is_some() => {
+                self.chosen = None;
+                return Typed::On;
+            }
+            KeyCode::Enter | KeyCode::NumpadEnter | KeyCode::Tab | KeyCode::ArrowRight => self.take_chosen(),
+            _ => {}
+        }
+        match code {
             KeyCode::Escape => return Typed::Nothing,
             KeyCode::Enter | KeyCode::NumpadEnter if self.text.is_empty() => return Typed::Nothing,
             // Into a folder.
@@ -84,6 +96,25 @@ impl Prompt {
         }
         self.look();
         Typed::On
+    }
+
+    /// Goes down the names, or up; above the first is the line itself.
+    fn choose(&mut self, by: isize) -> Typed {
+        let last = self.names.len().checked_sub(1);
+        self.chosen = match (self.chosen, by) {
+            (None, 1..) => last.and(Some(0)),
+            (None, _) => last,
+            (Some(here), _) => here.checked_add_signed(by).map(|next| next.min(last.unwrap_or(0))),
+        };
+        Typed::On
+    }
+
+    /// What the arrows went to stands in the line.
+    fn take_chosen(&mut self) {
+        if let Some(name) = self.chosen.and_then(|chosen| self.names.get(chosen)) {
+            self.text = format!("{}{name}", self.parts().0);
+            self.cursor = self.text.len();
+        }
     }
 
     fn remove(&mut self, from: usize, to: usize) {
@@ -177,6 +208,7 @@ impl Prompt {
             );
         }
         self.names = names;
+        self.chosen = None;
     }
 }
 
@@ -196,7 +228,7 @@ pub fn show(context: &Context, prompt: &Prompt) {
     card(context, "open", place, |ui| {
         ui.set_min_width(context.content_rect().width() * 0.5);
         ui.label(
-            RichText::new("open a scene or a sky (Tab completes, Enter opens, Esc closes)")
+            RichText::new("open a scene or a sky (Tab completes, arrows choose, Enter opens, Esc closes)")
                 .color(FAINT)
                 .small(),
         );
@@ -206,11 +238,19 @@ pub fn show(context: &Context, prompt: &Prompt) {
         if !prompt.said.is_empty() {
             ui.label(RichText::new(legible(context, &prompt.said)).color(CAUTION));
         }
-        for name in prompt.names.iter().take(MOST_NAMES) {
-            ui.label(RichText::new(legible(context, name)).font(FontId::monospace(11.0)).color(BRIGHT));
+        // The chosen one is always among those that are shown.
+        let above = prompt.chosen.map_or(0, |chosen| (chosen + 1).saturating_sub(MOST_NAMES));
+        for (n, name) in prompt.names.iter().enumerate().skip(above).take(MOST_NAMES) {
+            let color = if prompt.chosen == Some(n) { ACCENT } else { BRIGHT };
+            ui.label(RichText::new(legible(context, name)).font(FontId::monospace(11.0)).color(color));
         }
         if prompt.names.len() > MOST_NAMES {
-            let more = format!("and {} more", prompt.names.len() - MOST_NAMES);
+            let below = prompt.names.len() - MOST_NAMES - above;
+            let more = match (above, below) {
+                (0, below) => format!("and {below} more"),
+                (above, 0) => format!("and {above} above"),
+                (above, below) => format!("and {below} more, {above} above"),
+            };
             ui.label(RichText::new(more).color(FAINT).small());
         }
     });
@@ -251,6 +291,36 @@ mod tests {
             assert_eq!(typed, Typed::Open(Path::new(&home).join("a.glb")));
         }
         assert_eq!(at_home("a~/b"), "a~/b");
+    }
+
+    /// By the arrows alone, without a letter.
+    #[test]
+    fn arrows_choose_among_the_names() {
+        let folder = std::env::temp_dir().join(format!("penumbra-arrows-{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("models")).unwrap();
+        for name in ["a.glb", "b.obj", "models/c.glb"] {
+            std::fs::write(folder.join(name), "").unwrap();
+        }
+        let mut prompt = Prompt::new(&format!("{}/", folder.display()));
+        assert_eq!(prompt.names, ["a.glb", "b.obj", "models/"]);
+        let mut press = |code| (prompt.key(code, None, false), prompt.chosen);
+        assert_eq!(press(KeyCode::ArrowUp), (Typed::On, Some(2)), "the last");
+        assert_eq!(press(KeyCode::ArrowDown).1, Some(2), "no further");
+        assert_eq!(press(KeyCode::Escape), (Typed::On, None));
+        assert_eq!(press(KeyCode::ArrowDown).1, Some(0));
+        assert_eq!(press(KeyCode::ArrowUp).1, None, "back to the line");
+        for _ in 0..3 {
+            press(KeyCode::ArrowDown);
+        }
+        assert_eq!(press(KeyCode::Enter), (Typed::On, None), "into the folder");
+        press(KeyCode::ArrowDown);
+        assert_eq!(press(KeyCode::Enter).0, Typed::Open(folder.join("models/c.glb")));
+        press(KeyCode::Backspace);
+        assert_eq!(press(KeyCode::ArrowDown).1, Some(0), "what is typed chooses nothing");
+        std::fs::remove_dir_all(&folder).unwrap();
+        let mut empty = Prompt::new("no such folder/");
+        assert_eq!((empty.key(KeyCode::ArrowDown, None, false), empty.chosen), (Typed::On, None));
+        assert_eq!((empty.key(KeyCode::ArrowUp, None, false), empty.chosen), (Typed::On, None));
     }
 
     #[test]

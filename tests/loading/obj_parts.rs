@@ -1,0 +1,114 @@
+//! What an OBJ file names is a thing of its own.
+
+use super::*;
+
+/// A name and its materials, in the order of the file.
+fn parts(world: &mut World) -> Vec<(String, Vec<String>, usize)> {
+    let mut parts: Vec<_> = world
+        .query::<(Entity, &Instance, &Name)>()
+        .iter(world)
+        .map(|(entity, instance, name)| (entity, instance.clone(), name.to_string()))
+        .collect();
+    parts.sort_by_key(|(entity, ..)| entity.index_u32());
+    let of = |(_, instance, name): (Entity, Instance, String)| {
+        let materials = instance.materials.iter().map(|&m| world.get::<Name>(m).unwrap().to_string());
+        let mesh = &world.get::<Mesh>(instance.mesh).unwrap().0;
+        (name, materials.collect(), mesh.triangles.len())
+    };
+    parts.into_iter().map(of).collect()
+}
+
+fn part(name: &str, materials: &[&str], triangles: usize) -> (String, Vec<String>, usize) {
+    (name.to_owned(), materials.iter().map(|&m| m.to_owned()).collect(), triangles)
+}
+
+#[test]
+fn objects_are_things_with_their_own_materials() {
+    let text = format!(
+        "mtllib a.mtl\n{QUAD}f 1 2 3\no left chair\nusemtl red\nf 1 2 3 4\nusemtl blue\nf 1 2 3\no right\nf 1 3 4\n\
+         usemtl red\no empty\no left chair\nf 2 3 4\n"
+    );
+    let mtl = b"newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n";
+    let (mut world, report) = loaded_all(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]);
+    let found = parts(&mut world);
+    let (unnamed, others) = found.split_first().unwrap();
+    assert_eq!((unnamed.0.as_str(), unnamed.2), ("unnamed", 1), "what stands before the first name");
+    assert_eq!(others, [part("left chair", &["red", "blue"], 4), part("right", &["blue"], 1)]);
+    assert_eq!(report.triangles, 6);
+    let chair =
+        world.query::<(&Name, &Instance)>().iter(&world).find(|(name, _)| name.as_str() == "left chair");
+    let mesh = chair.unwrap().1.mesh;
+    assert_eq!(world.get::<Mesh>(mesh).unwrap().0.slots, [0, 0, 1, 0]);
+}
+
+#[test]
+fn groups_are_things_where_objects_are_not() {
+    let name = |text: &str| {
+        let (mut world, _) = loaded("a.obj", &format!("{QUAD}{text}"));
+        parts(&mut world).into_iter().map(|(name, ..)| name).collect::<Vec<_>>()
+    };
+    assert_eq!(name("g default\ng lid top\nf 1 2 3\ng pot\nf 1 3 4\n"), ["lid top", "pot"]);
+    assert_eq!(name("o scene\ng lid\nf 1 2 3\ng pot\nf 1 3 4\n"), ["lid", "pot"]);
+    assert_eq!(name("o a\ng lid\nf 1 2 3\no b\ng pot\nf 1 3 4\ng lid\nf 1 2 4\n"), ["a", "b"]);
+    // A file of one thing is that thing.
+    assert_eq!(name("o scene\nf 1 2 3\ng pot\nf 1 3 4\ng pot\nf 1 2 4\n").len(), 2);
+    for text in ["o a\nf 1 2 3\nf 1 3 4\n", "g a\nf 1 2 3\ng a\nf 1 3 4\n", "f 1 2 3\n"] {
+        assert_eq!(name(text).len(), 1, "{text}");
+        assert_ne!(name(text), ["unnamed"]);
+    }
+}
+
+/// Apart or together, the surface is the same: also normals of a smoothing group that goes on in another object.
+#[test]
+fn parts_together_are_the_whole() {
+    let roof = "v 0 0 0\nv 1 1 0\nv 2 0 0\nv 0 0 -1\nv 1 1 -1\nv 2 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\n";
+    let faces = ["s 1\nf 1/1 2/2 5/3 4/1\n", "f 2/2 3/1 6/1 5/3\n", "s 0\nf 1/1 2/2 3/3\n"];
+    let corners = |text: &str| {
+        let (mut world, _) = loaded("a.obj", text);
+        let mut corners = Vec::new();
+        for mesh in world.query::<&Mesh>().iter(&world) {
+            let mesh = &mesh.0;
+            let bits = |v: DVec3| v.to_array().map(|x| (x + 0.0).to_bits());
+            corners.extend(mesh.triangles.iter().map(|triangle| {
+                triangle.map(|vertex| {
+                    let vertex = vertex as usize;
+                    let uv = mesh.uvs[vertex].as_dvec2().extend(0.0);
+                    [mesh.positions[vertex].as_dvec3(), mesh.normals[vertex].as_dvec3(), uv].map(bits)
+                })
+            }));
+        }
+        corners.sort_unstable();
+        corners
+    };
+    let whole = corners(&format!("{roof}{}", faces.concat()));
+    let [a, b, c] = faces;
+    assert_eq!(corners(&format!("{roof}o a\n{a}o b\n{b}o c\n{c}")), whole);
+    assert_eq!(whole.len(), 5);
+}
+
+/// A number of boxes that nobody picks one by one, and names without end.
+#[test]
+fn very_many_things_are_one_and_that_is_said() {
+    for (count, keyword, is_one) in
+        [(512, "o", false), (513, "o", true), (30_000, "g", true), (30_000, "o", true)]
+    {
+        let faces: String = (0..count).map(|n| format!("{keyword} thing {n}\nf 1 2 3\n")).collect();
+        let (mut world, report) = loaded("a.obj", &format!("{QUAD}{faces}"));
+        let found = parts(&mut world);
+        assert_eq!(found.len(), if is_one { 1 } else { count });
+        assert_eq!(report.triangles, count);
+        let said = report.decisions().join("\n").contains("they are one thing");
+        assert_eq!(said, is_one, "{:?}", report.decisions());
+    }
+}
+
+/// Far from zero all parts are counted from one place.
+#[test]
+fn parts_of_a_map_stay_where_they_are() {
+    let text = "v 500000 0 0\nv 500001 0 0\nv 500001 1 0\nv 500000 1 0\no a\nf 1 2 3\no b\nf 1 3 4\n";
+    let (mut world, _) = loaded("a.obj", text);
+    let mut query = world.query_filtered::<&GlobalTransform, With<Instance>>();
+    let places: Vec<_> = query.iter(&world).map(|global| global.0.translation).collect();
+    assert_eq!(places.len(), 2);
+    assert!(places.iter().all(|place| *place == places[0] && place.x > 1e5), "{places:?}");
+}
