@@ -7,12 +7,15 @@ use super::place::Places;
 use super::style::{self, ACCENT, CAUTION, FAINT, MARGIN};
 use egui::scroll_area::ScrollSource;
 use egui::{Align2, Area, Context, DragValue, Grid, Id, Rect, RichText, ScrollArea, Ui, vec2};
+use std::cell::Cell;
 
 /// Of the card, points: it shall not move under the mouse.
 pub const WIDTH: f32 = 214.0;
 /// Of the names of numbers, and of the fields for these.
 const NAMES: f32 = 74.0;
 const FIELD: f32 = 96.0;
+/// Where it is kept of which thing and number too much or too little was typed last.
+const BEYOND: &str = "beyond its limits";
 /// Room for the names above the numbers, and for what is told below them.
 const HEAD: f32 = 64.0;
 const FOOT: f32 = 52.0;
@@ -89,14 +92,44 @@ fn show_numbers(ui: &mut Ui, status: &EditStatus, changed: &mut Vec<(Property, f
             let mut value = row.value + 0.0;
             let [low, high] = row.range;
             let speed = speed(row);
+            let typed = Cell::new(None);
+            let parse = |text: &str| {
+                let value = number(text);
+                typed.set(value);
+                value
+            };
             let drag = DragValue::new(&mut value).speed(speed).range(low..=high);
-            let drag = drag.max_decimals(decimals(speed));
-            if ui.add_sized([FIELD, ui.spacing().interact_size.y], drag).changed() {
+            let drag = drag.max_decimals(decimals(speed)).custom_parser(parse);
+            let is_changed = ui.add_sized([FIELD, ui.spacing().interact_size.y], drag).changed();
+            if is_changed {
                 changed.push((row.property, value));
             }
             ui.end_row();
+            let (beyond, here) = (Id::new(BEYOND), (status.place, i));
+            if is_changed || typed.get().is_some() {
+                let is_beyond = typed.get().is_some_and(|typed| !(low..=high).contains(&typed));
+                ui.data_mut(|data| data.insert_temp(beyond, is_beyond.then_some(here)));
+            }
+            if ui.data(|data| data.get_temp(beyond)) == Some(Some(here)) {
+                // The nearest that it can be is taken.
+                let limits = [low, high].map(short);
+                ui.label("");
+                ui.label(RichText::new(format!("{} to {}", limits[0], limits[1])).color(CAUTION).small());
+                ui.end_row();
+            }
         }
     });
+}
+
+/// As people type them: with a decimal comma, any minus, blanks.
+fn number(text: &str) -> Option<f64> {
+    let plain: String = text.chars().filter(|c| !c.is_whitespace()).collect();
+    plain.replace('−', "-").replace(',', ".").parse().ok().filter(|number: &f64| !number.is_nan())
+}
+
+/// A limit in few letters.
+fn short(limit: f64) -> String {
+    if limit == 0.0 || (1e-3..1e5).contains(&limit.abs()) { format!("{limit}") } else { format!("{limit:e}") }
 }
 
 /// What a point of the mouse adds.
@@ -131,5 +164,15 @@ mod tests {
             }
         }
         assert_eq!(decimals(0.002), 4, "no longer than it has to be");
+    }
+
+    #[test]
+    fn numbers_are_read_as_people_type_them() {
+        for (text, value) in
+            [(" 1 000.5", Some(1000.5)), ("−2,5", Some(-2.5)), ("1e3", Some(1e3)), ("nan", None), ("a", None)]
+        {
+            assert_eq!(number(text), value, "{text}");
+        }
+        assert_eq!([0.0, 1.0, -90.0, 1e-9, 1e12].map(short), ["0", "1", "-90", "1e-9", "1e12"]);
     }
 }
