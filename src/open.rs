@@ -6,7 +6,7 @@ use crate::first_look;
 use crate::image::{Display, ToneMap};
 use crate::load::{
     Card, Kind, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
-    load_unedited,
+    edited_scene, load_unedited,
 };
 use crate::scene::{
     ActiveCamera, Aspect, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform,
@@ -16,7 +16,7 @@ use crate::trace::{Film, Integrator, RenderSettings, Sampling};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, UVec2};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -198,18 +198,6 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     let card = Card::of(&source.to_string(), &report).text();
     app.world.insert_resource(LoadCard { text: card.into(), warnings: report.warnings().len() });
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
-}
-
-/// The scene beside a file of edits that was saved beside it, and that file.
-fn edited_scene(source: &SceneSource) -> Option<(SceneSource, PathBuf)> {
-    let SceneSource::File(edits) = source else { return None };
-    let (stem, number) = edits.file_name()?.to_str()?.strip_suffix(".toml")?.rsplit_once(".edits_")?;
-    number.parse::<u32>().ok()?;
-    let mut scenes = ["gltf", "glb", "obj", "toml"]
-        .map(|ending| edits.with_file_name(format!("{stem}.{ending}")))
-        .into_iter();
-    let scene = scenes.find(|scene| scene.is_file())?;
-    Some((SceneSource::File(scene), edits.clone()))
 }
 
 /// What to say of edits that were saved beside the scene: they are applied only if somebody asks for them.

@@ -1,7 +1,7 @@
 //! The report card of a file: what was found, mended, left out, approximated, decided; or why it is refused.
 
-use super::report::{Found, Kind, LoadReport, Phase, Remark};
-use super::{LoadError, LoadOptions, SceneSource, load};
+use super::report::{Found, Kind, LoadReport, Phase, Remark, harmless};
+use super::{LoadError, LoadOptions, SceneSource, edited_scene, load};
 use bevy_ecs::world::World;
 use serde::Serialize;
 use std::ffi::OsStr;
@@ -48,8 +48,15 @@ impl Card {
     /// Loads what `argument` names (a file or a built-in scene) and keeps only the card.
     #[must_use]
     pub fn check(argument: impl AsRef<OsStr>, options: &LoadOptions) -> Self {
-        let loaded =
-            SceneSource::parse(&argument).and_then(|source| load(&mut World::new(), &source, options));
+        let loaded = SceneSource::parse(&argument).and_then(|source| {
+            match edited_scene(&source).filter(|_| options.scene_settings.is_none()) {
+                Some((scene, edits)) => {
+                    let options = LoadOptions { scene_settings: Some(edits), ..options.clone() };
+                    load(&mut World::new(), &scene, &options)
+                }
+                None => load(&mut World::new(), &source, options),
+            }
+        });
         Self::new(&argument.as_ref().to_string_lossy(), &loaded)
     }
 
@@ -93,14 +100,14 @@ impl Card {
     pub fn text(&self) -> String {
         let mut text = match (self.verdict, &self.error) {
             (Verdict::Refused, Some(error)) => {
-                return format!("{}: refused\n  error         {error}", self.file);
+                return format!("{}: refused\n  error         {}", harmless(&self.file), harmless(error));
             }
             (Verdict::Valid, _) => format!("{}: valid", self.file),
             _ => format!("{}: loads, though not all of it as it is in the file", self.file),
         };
         let mut line = |head: &str, what: &str| {
             // Writing to a String cannot fail.
-            let _ = write!(text, "\n  {head:<13} {what}");
+            let _ = write!(text, "\n  {head:<13} {}", harmless(what));
         };
         for format in &self.found.formats {
             line("format", format);

@@ -2,7 +2,7 @@
 
 use super::error::LoadError;
 use super::source::read_file;
-use super::{SceneFiles, SceneSource};
+use super::{SceneFiles, SceneSource, built_in_scenes};
 use std::path::{Path, PathBuf};
 
 /// Folders within folders that are looked into.
@@ -13,6 +13,23 @@ const MOST_ENTRIES: usize = 100_000;
 const MOST_SETTINGS: u64 = 1 << 20;
 /// How many a message names.
 const MOST_NAMED: usize = 8;
+
+/// The scene that a file of edits is of, which was saved beside it or, of one that needs no file, where the program was
+/// started; and that file.
+#[must_use]
+pub fn edited_scene(source: &SceneSource) -> Option<(SceneSource, PathBuf)> {
+    let SceneSource::File(edits) = source else { return None };
+    let (stem, number) = edits.file_name()?.to_str()?.strip_suffix(".toml")?.rsplit_once(".edits_")?;
+    number.parse::<u32>().ok()?;
+    let endings = ["gltf", "glb", "obj", "toml"];
+    let mut scenes = endings.map(|ending| edits.with_file_name(format!("{stem}.{ending}"))).into_iter();
+    let built_in = || built_in_scenes().iter().find(|scene| scene.name == stem);
+    let scene = match scenes.find(|scene| scene.is_file()) {
+        Some(scene) => SceneSource::File(scene),
+        None => SceneSource::BuiltIn(built_in()?.name),
+    };
+    Some((scene, edits.clone()))
+}
 
 /// The scenes in a folder and in those below it, by path: `.gltf`, `.glb` and `.obj`, and `.toml` with models. Links to folders
 /// are not followed.

@@ -35,10 +35,10 @@ pub use card::{Card, Verdict};
 pub(crate) use error::choices;
 pub use error::{LoadError, ReadError};
 pub use files::{SceneFiles, Stamp, stamp};
-pub use folder::scenes_in;
+pub use folder::{edited_scene, scenes_in};
 pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use made::Made;
-pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher};
+pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher, harmless};
 pub use settings::{SidecarFilter, SidecarIntegrator, SidecarRender};
 
 use crate::scene::{ActiveCamera, Light, Playing, Transform, deform, play, propagate_transforms};

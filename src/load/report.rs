@@ -8,6 +8,7 @@ use crate::scene::{Camera, Instance, Light, Material, Mesh, Texture};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
@@ -146,13 +147,24 @@ impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { file, what, count, places, .. } = self;
         let more = if *count > places.len() && places.len() == MOST_PLACES { ", ..." } else { "" };
-        match (count, places.as_slice()) {
-            (1, []) => write!(f, "{file}: {what}"),
-            (1, [place, ..]) => write!(f, "{file}: {place}: {what}"),
-            (count, []) => write!(f, "{file}: {what}: {count}"),
-            (count, places) => write!(f, "{file}: {what}: {count} ({}{more})", places.join(", ")),
-        }
+        let line = match (count, places.as_slice()) {
+            (1, []) => format!("{file}: {what}"),
+            (1, [place, ..]) => format!("{file}: {place}: {what}"),
+            (count, []) => format!("{file}: {what}: {count}"),
+            (count, places) => format!("{file}: {what}: {count} ({}{more})", places.join(", ")),
+        };
+        f.write_str(&harmless(&line))
     }
+}
+
+/// One line of text that does nothing to the terminal it is shown on, whatever a file calls its things.
+#[must_use]
+pub fn harmless(text: &str) -> Cow<'_, str> {
+    if !text.contains(char::is_control) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c: char| if c.is_control() { c.escape_debug().to_string() } else { c.to_string() };
+    text.chars().map(shown).collect()
 }
 
 /// What is in a scene.

@@ -4,9 +4,12 @@ use super::builtin;
 use super::error::ReadError;
 use super::files::SceneFiles;
 use std::borrow::Cow;
+use std::collections::HashMap;
+use std::ffi::OsString;
 use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use unicode_normalization::UnicodeNormalization;
 
 /// Most bytes of a scene file or buffer.
@@ -25,7 +28,7 @@ pub(super) type Bytes = Cow<'static, [u8]>;
 #[derive(Clone, Debug)]
 pub(super) enum Folder {
     /// On disk; what is asked for is remembered.
-    Disk(PathBuf, SceneFiles),
+    Disk(PathBuf, SceneFiles, Listings),
     /// Among the assets compiled into the program.
     BuiltIn,
 }
@@ -34,13 +37,13 @@ impl Folder {
     /// The folder that `path` lies in.
     pub(super) fn of(path: &Path, files: &SceneFiles) -> Self {
         let parent = path.parent().filter(|parent| *parent != Path::new(""));
-        Self::Disk(parent.unwrap_or(Path::new(".")).to_path_buf(), files.clone())
+        Self::Disk(parent.unwrap_or(Path::new(".")).to_path_buf(), files.clone(), Listings::default())
     }
 
     /// Where a file that one's own settings name is; `None` in a built-in scene.
     pub(super) fn path(&self, reference: &str) -> Option<PathBuf> {
         match self {
-            Self::Disk(folder, _) => Some(folder.join(reference)),
+            Self::Disk(folder, ..) => Some(folder.join(reference)),
             Self::BuiltIn => None,
         }
     }
@@ -48,7 +51,7 @@ impl Folder {
     /// Reads what one's own settings name, wherever it is; also as messages call it, and the folder that it lies in.
     pub(super) fn read_own(&self, reference: &str, limit: u64) -> (String, Self, Result<Bytes, ReadError>) {
         match self {
-            Self::Disk(folder, files) => {
+            Self::Disk(folder, files, _) => {
                 let path = folder.join(reference);
                 let bytes = read_file(&path, limit, files);
                 (path.to_string_lossy().into_owned(), Self::of(&path, files), bytes)
@@ -69,13 +72,13 @@ impl Folder {
         let reference = reference.replace('\\', "/");
         let relative = inside(&reference).ok_or(ReadError::Outside)?;
         match self {
-            Self::Disk(folder, files) => {
+            Self::Disk(folder, files, listings) => {
                 let exact = folder.join(&relative);
                 files.note(&exact);
                 if exact.exists() {
                     read_file(&exact, limit, files)
                 } else {
-                    read_file(&any_case(folder, &relative)?, limit, files)
+                    read_file(&listings.any_case(folder, &relative)?, limit, files)
                 }
             }
             Self::BuiltIn => {
@@ -88,9 +91,9 @@ impl Folder {
     pub(super) fn has(&self, reference: &str) -> bool {
         let relative = inside(&reference.replace('\\', "/"));
         relative.is_some_and(|relative| match self {
-            Self::Disk(folder, files) => {
+            Self::Disk(folder, files, listings) => {
                 files.note(&folder.join(&relative));
-                any_case(folder, &relative).is_ok_and(|path| path.is_file())
+                listings.any_case(folder, &relative).is_ok_and(|path| path.is_file())
             }
             Self::BuiltIn => builtin::asset(&relative.to_string_lossy()).is_some(),
         })
@@ -121,10 +124,12 @@ impl Folder {
         if let Some(found) = shorter.iter().find_map(|&at| self.read(&reference[at..], limit).ok()) {
             return Ok(found);
         }
-        let Self::Disk(folder, files) = self else { return Err(first) };
+        let Self::Disk(folder, files, listings) = self else { return Err(first) };
         let bare = &reference[folders.last().copied().unwrap_or(0)..];
-        let there =
-            |folder: PathBuf| Self::Disk(folder, files.clone()).read(&format!("textures/{bare}"), limit).ok();
+        let there = |folder: PathBuf| {
+            let folder = Self::Disk(folder, files.clone(), listings.clone());
+            folder.read(&format!("textures/{bare}"), limit).ok()
+        };
         [folder.clone(), folder.join("..")].into_iter().find_map(there).ok_or(first)
     }
 }
@@ -186,24 +191,36 @@ fn folded(name: &str) -> String {
     name.nfc().flat_map(char::to_lowercase).nfc().collect()
 }
 
-/// Finds `relative` below `folder` whatever the case of its letters and the form of its accents.
-fn any_case(folder: &Path, relative: &Path) -> Result<PathBuf, ReadError> {
-    let mut found = folder.to_path_buf();
-    for component in relative.components() {
-        let exact = found.join(component);
-        if exact.exists() {
-            found = exact;
-            continue;
+/// What is in folders, by [`folded`] names, as it was when first asked for: a scene may ask for thousands of files that are not
+/// there, or are called otherwise. Clones are the same.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Listings(Arc<Mutex<HashMap<PathBuf, HashMap<String, OsString>>>>);
+
+impl Listings {
+    /// Finds `relative` below `folder` whatever the case of its letters and the form of its accents.
+    fn any_case(&self, folder: &Path, relative: &Path) -> Result<PathBuf, ReadError> {
+        let mut found = folder.to_path_buf();
+        for component in relative.components() {
+            let exact = found.join(component);
+            found = if exact.exists() { exact } else { self.find(found, component)? };
         }
-        let wanted = folded(&component.as_os_str().to_string_lossy());
-        found = fs::read_dir(&found)
-            .map_err(from_io)?
-            .filter_map(Result::ok)
-            .find(|entry| folded(&entry.file_name().to_string_lossy()) == wanted)
-            .ok_or(ReadError::Missing)?
-            .path();
+        Ok(found)
     }
-    Ok(found)
+
+    fn find(&self, folder: PathBuf, name: Component<'_>) -> Result<PathBuf, ReadError> {
+        let wanted = folded(&name.as_os_str().to_string_lossy());
+        let mut listings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(listing) = listings.get(&folder) {
+            return listing.get(&wanted).map(|name| folder.join(name)).ok_or(ReadError::Missing);
+        }
+        let mut listing = HashMap::new();
+        for name in fs::read_dir(&folder).map_err(from_io)?.flatten().map(|entry| entry.file_name()) {
+            listing.entry(folded(&name.to_string_lossy())).or_insert(name);
+        }
+        let found = listing.get(&wanted).map(|name| folder.join(name)).ok_or(ReadError::Missing);
+        listings.insert(folder, listing);
+        found
+    }
 }
 
 /// The bytes that a percent-encoded text stands for; a `%` without two digits is itself.

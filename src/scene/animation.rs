@@ -74,6 +74,10 @@ pub struct Pose {
     pub scale: DVec3,
 }
 
+/// On what was moved by hand: it stands where it was put, whatever animations say.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ByHand;
+
 /// How much of each morph target goes into a [`super::Deform`]ing mesh.
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct MorphWeights(pub Vec<f32>);
@@ -92,7 +96,7 @@ pub struct Playing {
 pub fn play(
     playing: Res<Playing>,
     animations: Query<&Animation>,
-    mut poses: Query<(&mut Pose, &mut Transform)>,
+    mut poses: Query<(&mut Pose, &mut Transform), Without<ByHand>>,
     mut weights: Query<&mut MorphWeights>,
 ) {
     let Some(time) = playing.time else { return };

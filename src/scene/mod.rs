@@ -18,7 +18,9 @@ mod sky;
 pub mod texture;
 pub mod transform;
 
-pub use animation::{Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, play};
+pub use animation::{
+    Animation, ByHand, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, play,
+};
 pub use bounds::SceneBounds;
 pub use camera::{ActiveCamera, Aspect, Camera, Lens, Projection};
 pub use deform::{Deform, Influences, Skin, Target, deform};

@@ -163,7 +163,7 @@ pub fn save_picture(world: &mut World) {
     let saved =
         [save(&name(n, "exr"), film, display), save_with_recipe(&name(n, "png"), film, display, &recipe)];
     let said = match saved.into_iter().find_map(Result::err) {
-        None => format!("saved {stem}_{n}.exr and .png"),
+        None => format!("saved {stem}_{n}.exr and .png where the program was started"),
         Some(error) => {
             // What took the number.
             let empty = std::fs::metadata(name(n, "exr")).is_ok_and(|file| file.len() == 0);

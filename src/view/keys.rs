@@ -2,6 +2,7 @@
 
 use super::input::{Command, Press};
 use super::keymap::{Action, Entry, Hold, Keymap, Tap, is_modifier};
+use super::reload::is_sky;
 use super::replay::Event;
 use super::ui::open::{Prompt, Typed};
 use super::window::Viewer;
@@ -89,7 +90,8 @@ impl Viewer {
         let text = pasted.as_deref().or(text.filter(|_| !control));
         match prompt.key(code, text, control) {
             Typed::Nothing => self.ui.prompt = None,
-            Typed::Open(path) if self.may_lose_edits() => {
+            // Another sky takes nothing away.
+            Typed::Open(path) if is_sky(&path) || self.may_lose_edits() => {
                 self.tried = self.ui.prompt.take();
                 self.record(&Event::Open(path.clone()));
                 self.send(Command::Open(path));

@@ -2,6 +2,7 @@
 
 use super::builder::{Builder, TRIANGLE};
 use super::*;
+use glam::DQuat;
 use penumbra::app::App;
 use penumbra::scene::Playing;
 use penumbra::trace::RenderSettings;
@@ -130,6 +131,44 @@ fn one_file_of_several_may_have_the_animation_and_edits_are_made_in_its_pose() {
     assert_eq!(place(&mut world, "one").translation, DVec3::Y * 9.0);
 }
 
+/// A channel moves its own part of a placement and leaves the others as the node has them, mirrored or of no size.
+#[test]
+fn what_is_not_animated_stays_as_the_node_has_it() {
+    let signs = [-1.0, 1.0];
+    let mirrored =
+        signs.into_iter().flat_map(|x| signs.into_iter().flat_map(move |y| signs.map(|z| [x, y, z])));
+    for [x, y, z] in mirrored.chain([[0.0; 3], [1.0, 0.0, 1.0]]) {
+        for (path, values) in [
+            ("scale", format!("[{x},{y},{z}]")),
+            ("rotation", "[0,0.6,0,0.8]".to_owned()),
+            ("translation", "[1,2,3]".to_owned()),
+        ] {
+            // Its keys say what the node says: at any time it stands as at rest. What has no size becomes a whole.
+            let mut file = Builder::default();
+            let positions = file.floats("VEC3", &TRIANGLE);
+            let times = file.floats("SCALAR", &[0.0, 2.0]);
+            let grown = if x * y * z == 0.0 && path == "scale" { "[1,1,1]".to_owned() } else { values };
+            let numbers: Vec<f32> =
+                grown.trim_matches(['[', ']']).split(',').map(|n| n.parse().unwrap()).collect();
+            let kind = if numbers.len() == 4 { "VEC4" } else { "VEC3" };
+            let keys = file.floats(kind, &[numbers.as_slice(), &numbers].concat());
+            let text = file.finish(&format!(
+                r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":{positions}}}}}]}}],
+                "nodes":[{{"name":"thing","mesh":0,"translation":[1,2,3],"rotation":[0,0.6,0,0.8],"scale":[{x},{y},{z}]}}],
+                "scenes":[{{"nodes":[0]}}],"animations":[{{"samplers":[{{"input":{times},"output":{keys}}}],
+                "channels":[{{"sampler":0,"target":{{"node":0,"path":"{path}"}}}}]}}]"#
+            ));
+            let (mut world, report) = with(&text, &at(1.0));
+            let scale = if x * y * z == 0.0 && path == "scale" { DVec3::ONE } else { DVec3::new(x, y, z) };
+            let turn = DQuat::from_xyzw(0.0, 0.6, 0.0, 0.8);
+            let wanted = DAffine3::from_scale_rotation_translation(scale, turn, DVec3::new(1.0, 2.0, 3.0));
+            let placed = place(&mut world, "thing");
+            assert!(placed.abs_diff_eq(wanted, 1e-6), "{path} of {x}, {y}, {z}: {placed:?}");
+            assert_eq!(report.warnings(), [""; 0]);
+        }
+    }
+}
+
 #[test]
 fn a_frame_follows_the_clock() {
     let mut app = App::new(RenderSettings::default());
@@ -176,6 +215,38 @@ fn joints_and_morph_targets_shape_a_mesh_at_rest_and_at_a_time() {
     // A second set of the same four changes nothing.
     let (mut world, _) = with(&bending(SKIN, r#","skin":0"#, true), &at(0.5));
     assert_eq!(only_mesh(&mut world).positions, expected);
+}
+
+/// Its own node places no skinned mesh, but says which side of its triangles is their front (glTF 2.0, 3.7.4).
+#[test]
+fn a_mirrored_node_turns_the_front_of_its_skinned_mesh() {
+    for (scale, mirrors) in [("[1,1,1]", false), ("[-1,1,1]", true), ("[2,-1,-1]", false)] {
+        let text = bending(SKIN, &format!(r#","skin":0,"scale":{scale}"#), false);
+        let (mut world, _) = with(&text, &LoadOptions::default());
+        let placed = world.query_filtered::<&GlobalTransform, With<Instance>>().single(&world).unwrap().0;
+        assert_eq!(placed.matrix3.determinant() < 0.0, mirrors, "{scale}");
+        // Where it stands is all the same.
+        let at = |corner: Vec3| placed.transform_point3(corner.as_dvec3()).as_vec3();
+        let corners: Vec<Vec3> = only_mesh(&mut world).positions.into_iter().map(at).collect();
+        assert_eq!(corners, [Vec3::ZERO, Vec3::new(1., 2., 0.), Vec3::new(0., 1., 0.75)]);
+    }
+}
+
+/// Single precision would have squashed it.
+#[test]
+fn a_skinned_mesh_far_from_zero_keeps_its_shape() {
+    let near = bending(SKIN, r#","skin":0"#, false);
+    let far = near
+        .replace(r#"{"name":"j0"}"#, r#"{"name":"j0","translation":[6400000.125,0,0]}"#)
+        .replace(r#""translation":[0,2,0]"#, r#""translation":[6400000.125,2,0]"#);
+    let (mut world, _) = with(&far, &LoadOptions::default());
+    let placed = world.query_filtered::<&GlobalTransform, With<Instance>>().single(&world).unwrap().0;
+    let corners = only_mesh(&mut world).positions;
+    let expected = [Vec3::ZERO, Vec3::new(1., 2., 0.), Vec3::new(0., 1., 0.75)];
+    for (corner, expected) in corners.into_iter().zip(expected) {
+        let place = placed.transform_point3(corner.as_dvec3()) - DVec3::X * 6_400_000.125;
+        assert!((place - expected.as_dvec3()).length() < 1e-6, "{place} for {expected}");
+    }
 }
 
 #[test]

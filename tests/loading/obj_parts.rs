@@ -58,13 +58,17 @@ fn groups_are_things_where_objects_are_not() {
     }
 }
 
-/// Apart or together, the surface is the same: also normals of a smoothing group that goes on in another object.
+/// Apart or together, the surface is the same: also normals of a smoothing group and the directions of a normal map that go on in
+/// another object.
 #[test]
 fn parts_together_are_the_whole() {
     let roof = "v 0 0 0\nv 1 1 0\nv 2 0 0\nv 0 0 -1\nv 1 1 -1\nv 2 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\n";
     let faces = ["s 1\nf 1/1 2/2 5/3 4/1\n", "f 2/2 3/1 6/1 5/3\n", "s 0\nf 1/1 2/2 3/3\n"];
     let corners = |text: &str| {
-        let (mut world, _) = loaded("a.obj", text);
+        let text = format!("mtllib a.mtl\nusemtl m\n{text}");
+        let mtl = b"newmtl m\nnorm n.png\n";
+        let files = [("a.obj", text.as_bytes()), ("a.mtl", mtl), ("n.png", &png([128, 128, 255, 255]))];
+        let (mut world, _) = loaded_all(&files);
         let mut corners = Vec::new();
         for mesh in world.query::<&Mesh>().iter(&world) {
             let mesh = &mesh.0;
@@ -73,7 +77,9 @@ fn parts_together_are_the_whole() {
                 triangle.map(|vertex| {
                     let vertex = vertex as usize;
                     let uv = mesh.uvs[vertex].as_dvec2().extend(0.0);
-                    [mesh.positions[vertex].as_dvec3(), mesh.normals[vertex].as_dvec3(), uv].map(bits)
+                    let tangent = mesh.tangents[vertex].truncate().as_dvec3();
+                    [mesh.positions[vertex].as_dvec3(), mesh.normals[vertex].as_dvec3(), uv, tangent]
+                        .map(bits)
                 })
             }));
         }
@@ -86,20 +92,65 @@ fn parts_together_are_the_whole() {
     assert_eq!(whole.len(), 5);
 }
 
-/// A number of boxes that nobody picks one by one, and names without end.
+/// Things that nobody picks one by one, and names without end.
 #[test]
 fn very_many_things_are_one_and_that_is_said() {
-    for (count, keyword, is_one) in
-        [(512, "o", false), (513, "o", true), (30_000, "g", true), (30_000, "o", true)]
-    {
-        let faces: String = (0..count).map(|n| format!("{keyword} thing {n}\nf 1 2 3\n")).collect();
-        let (mut world, report) = loaded("a.obj", &format!("{QUAD}{faces}"));
-        let found = parts(&mut world);
-        assert_eq!(found.len(), if is_one { 1 } else { count });
+    let apart = |count: usize, statement: &dyn Fn(usize) -> String| -> String {
+        let corners = |n: usize| format!("v {n} 0 0\nv {n} 1 0\nv {n} 0 1\n");
+        (0..count).map(|n| format!("{}{}f -1 -2 -3\n", corners(n), statement(n))).collect()
+    };
+    let object = |n: usize| format!("o thing {n}\n");
+    let sides = |n: usize| format!("o thing {n}\ng {}\n", if n < 300 { "left" } else { "right" });
+    let empty = |n: usize| format!("o curve {n}\no thing {}\n", n % 2);
+    for (count, statement, things, words) in [
+        (512, &object as &dyn Fn(usize) -> String, 512, ""),
+        (513, &object, 1, "more than 512 objects (`o`): they are one thing"),
+        (30_000, &object, 1, "they are one thing"),
+        (30_000, &|n| format!("g thing {n}\n"), 1, "more than 512 groups (`g`): they are one thing"),
+        (600, &sides, 2, "more than 512 objects (`o`): its groups (`g`) are things instead"),
+        (600, &empty, 2, ""),
+    ] {
+        let (mut world, report) = loaded("a.obj", &apart(count, statement));
+        assert_eq!(parts(&mut world).len(), things, "{count}, {words}");
         assert_eq!(report.triangles, count);
-        let said = report.decisions().join("\n").contains("they are one thing");
-        assert_eq!(said, is_one, "{:?}", report.decisions());
+        let said = report.decisions().join("\n");
+        assert!(if words.is_empty() { !said.contains("one thing") } else { said.contains(words) }, "{said}");
     }
+}
+
+/// Rays would have to enter each of their boxes.
+#[test]
+fn things_that_lie_through_one_another_are_one() {
+    let leaves = |kinds: usize| -> String {
+        let leaf = |n: usize| {
+            let (x, y) = (n % 10, n / 10);
+            format!(
+                "v {x} {y} 0\nv {x}.5 {y} 0\nv {x} {y}.5 1\ng kind {}\nusemtl m{}\nf -1 -2 -3\n",
+                n % kinds,
+                n % 2
+            )
+        };
+        (0..100).map(leaf).collect()
+    };
+    let (mut world, report) = loaded("a.obj", &leaves(3));
+    assert_eq!(parts(&mut world).len(), 3);
+    assert!(!report.decisions().join("\n").contains("one thing"));
+    let (mut world, report) = loaded("a.obj", &leaves(17));
+    let found = parts(&mut world);
+    assert_eq!((found.len(), found[0].2, found[0].1.len()), (1, 100, 2));
+    assert_eq!(only_mesh(&mut world).slots, [0, 1].repeat(50));
+    assert_says(
+        &report.decisions().join("\n"),
+        "its objects or groups lie through one another: they are one thing",
+    );
+}
+
+/// Two objects of so many materials take no longer than one.
+#[test]
+fn materials_without_end_are_no_slower_in_parts() {
+    let faces: String = (0..40_000).map(|n| format!("usemtl m{}\nf 1 2 3\n", n % 20_000)).collect();
+    let (mut world, report) = loaded("a.obj", &format!("{QUAD}o a\n{faces}o b\n{faces}"));
+    assert_eq!((parts(&mut world).len(), report.triangles), (2, 80_000));
 }
 
 /// Far from zero all parts are counted from one place.

@@ -32,6 +32,47 @@ fn models_of_glass_are_glass_only_where_light_can_pass() {
     let (_, half, _) = material("Kd 1 0 0\nNi 1.45\nd 0.5\nillum 9");
     assert_eq!((half.glass, half.base_color, half.alpha, half.opacity), (None, Vec3::X, Alpha::Blend, 0.5));
     assert!(!is_glass("Kd 0 0 0\nmap_Kd red.png\nillum 4"));
+    // Of a filter that lets nothing pass nobody makes black glass.
+    let (_, dark, report) = material("Kd 0.5 0.4 0.3\nTf 0 0 0\nNi 1.5\nillum 4");
+    assert_eq!((dark.glass, dark.base_color), (None, Vec3::new(0.5, 0.4, 0.3)));
+    assert_says(&report.decisions().join("\n"), "Tf 0, which lets no light through: no glass");
+    let (_, clear, _) = material("Kd 0 0 0\nTf 0 0 0\nNi 1.5\nillum 4");
+    assert_eq!(clear.glass.unwrap().tint, Vec3::ONE);
+}
+
+/// A picture that is named is meant to be seen.
+#[test]
+fn a_black_factor_does_not_hide_its_picture() {
+    for (statements, words) in [
+        ("Ke 0 0 0\nmap_Ke red.png", "Ke is black"),
+        ("d 0\nmap_d red.png", "d is 0"),
+        ("Ks 0 0 0\nNs 50\nmap_Ks red.png", "map_Ks without Ks"),
+    ] {
+        let (_, m, report) = material(statements);
+        assert_says(&report.warnings().join("\n"), words);
+        assert_eq!(m.emission != Vec3::ZERO, statements.starts_with("Ke"), "{statements}");
+        assert_eq!(m.opacity, 1.0, "{statements}");
+    }
+    let (_, dark, _) = material("Ke 0 0 0\nmap_Ke not_there.png");
+    assert_eq!(dark.emission, Vec3::ZERO, "what stands in for a picture is no lamp");
+}
+
+#[test]
+fn statements_in_capitals_are_what_they_are() {
+    let obj = format!("MTLLIB a.mtl\n{QUAD}O one\nUSEMTL m\nF 1 2 3\nO two\nS 1\nF 1 3 4\n");
+    let (mut world, report) = loaded_all(&[("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl m\nKd 1 0 0\n")]);
+    assert_eq!(report.warnings(), [""; 0]);
+    assert_eq!(world.query::<&Instance>().iter(&world).count(), 2);
+    assert_eq!(named::<Material>(&mut world, "m").base_color, Vec3::X);
+}
+
+/// What a file calls its things is shown, not done.
+#[test]
+fn names_do_nothing_to_the_terminal() {
+    let (_, report) = loaded("a.obj", &format!("{QUAD}usemtl \u{1b}[2Jgone\u{7}\nf 1 2 3\n"));
+    let said = report.warnings().join("\n");
+    assert_says(&said, "gone");
+    assert!(!said.replace('\n', "").contains(char::is_control), "{said:?}");
 }
 
 #[test]

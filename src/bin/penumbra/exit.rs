@@ -12,6 +12,7 @@ pub const INTERRUPTED: u8 = 130;
 
 /// Says what went wrong, and gives `code`.
 pub fn because(error: &impl Display, code: u8) -> u8 {
-    eprintln!("error: {error}");
+    // It may speak of a file's own names.
+    eprintln!("error: {}", penumbra::load::harmless(&error.to_string()));
     code
 }

@@ -1,12 +1,10 @@
 //! Animations → [`Animation`] entities. One that is damaged is left out; it never costs the scene.
 
 use super::Document;
-use super::parse::{Lenient, Whole};
+use super::parse::{Lenient, Placement, Whole};
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
-use crate::scene::{
-    Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property, Transform,
-};
+use crate::scene::{Animation, Channel, Curve, Interpolation, MorphWeights, Playing, Pose, Property};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use gltf::json::Index;
@@ -128,8 +126,8 @@ fn convert(
             }
         };
         // A node that is not in the scene shown moves nothing there.
-        let node = channel.target.node.and_then(|Whole(node)| entities.get(node as usize).copied().flatten());
-        let Some(target) = node else { continue };
+        let Some(Whole(node)) = channel.target.node else { continue };
+        let Some(target) = entities.get(node as usize).copied().flatten() else { continue };
         let sampler = match json.samplers.get(channel.sampler.0 as usize) {
             Some(Lenient::Good(sampler)) => sampler,
             Some(Lenient::Bad(_)) => {
@@ -157,9 +155,9 @@ fn convert(
             continue;
         }
         if property != Property::Weights && sink.world.get::<Pose>(target).is_none() {
-            let local = sink.world.get::<Transform>(target).copied().unwrap_or_default();
-            let (scale, rotation, translation) = local.0.to_scale_rotation_translation();
-            sink.world.entity_mut(target).insert(Pose { translation, rotation, scale });
+            let nothing = Placement::default();
+            let placement = document.placements.get(node as usize).unwrap_or(&nothing);
+            sink.world.entity_mut(target).insert(placement.pose());
         }
         animation.duration = animation.duration.max(curve.times.last().copied().unwrap_or(0.0).into());
         animation.channels.push(Channel { target, property, curve });

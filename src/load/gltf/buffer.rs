@@ -45,7 +45,7 @@ pub(super) fn read_all<'a>(
 
 /// Reads a `data:` URI or a percent-encoded reference to a file of the scene's folder.
 pub(super) fn read_uri(folder: &Folder, uri: &str, limit: u64) -> Result<Bytes, ReadError> {
-    if let Some(data) = uri.strip_prefix("data:") {
+    if let Some(data) = data_of(uri) {
         return decode_data(data).map(Cow::Owned);
     }
     if uri.trim().is_empty() {
@@ -77,7 +77,7 @@ pub(super) fn read_image(folder: &Folder, uri: &str) -> (Result<Bytes, ReadError
 
 /// A URI short enough for a message.
 pub(super) fn shorten(uri: &str) -> String {
-    if uri.starts_with("data:") {
+    if data_of(uri).is_some() {
         return "data URI".to_owned();
     }
     let decoded = percent_decoded(uri);
@@ -126,21 +126,29 @@ impl<'a> Document<'a> {
     }
 }
 
+/// What follows `data:`, in letters of any case (RFC 3986, 3.1).
+fn data_of(uri: &str) -> Option<&str> {
+    uri.split_at_checked(5).filter(|(scheme, _)| scheme.eq_ignore_ascii_case("data:")).map(|(_, data)| data)
+}
+
 fn decode_data(data: &str) -> Result<Vec<u8>, ReadError> {
     let (head, body) = data.split_once(',').ok_or(ReadError::Data("data URI without a comma"))?;
     if head.split(';').any(|word| word.eq_ignore_ascii_case("base64")) {
-        decode_base64(body).ok_or(ReadError::Data("data URI is not valid base64"))
+        // Where escaped, it is escaped text like any other (RFC 2397).
+        let plain =
+            if body.contains('%') { Cow::Owned(percent_decoded(body)) } else { body.as_bytes().into() };
+        decode_base64(&plain).ok_or(ReadError::Data("data URI is not valid base64"))
     } else {
         Ok(percent_decoded(body))
     }
 }
 
 /// RFC 4648, either alphabet, with or without padding and line breaks.
-fn decode_base64(text: &str) -> Option<Vec<u8>> {
+fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let (mut pending, mut bits) = (0_u32, 0_u32);
-    let digits = text.bytes().filter(|byte| !byte.is_ascii_whitespace());
-    let padding = text.trim_end().bytes().rev().take_while(|&byte| byte == b'=').count();
+    let digits = text.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
+    let padding = text.trim_ascii_end().iter().rev().take_while(|&&byte| byte == b'=').count();
     let count = digits.clone().count().checked_sub(padding)?;
     if padding > 2 || count % 4 == 1 {
         return None;
@@ -170,10 +178,15 @@ mod tests {
 
     #[test]
     fn base64_is_read_with_and_without_padding() {
-        assert_eq!(decode_base64("aGFsbG8=").as_deref(), Some(b"hallo".as_slice()));
-        assert_eq!(decode_base64("aGFs\nbG8").as_deref(), Some(b"hallo".as_slice()));
-        assert_eq!(decode_base64("aGFsbG8*"), None);
-        assert_eq!(decode_base64("a"), None);
-        assert_eq!(decode_base64("a="), None);
+        for text in ["aGFsbG8=", "aGFs\nbG8", "aGFs\nbG8=\n"] {
+            assert_eq!(decode_base64(text.as_bytes()).as_deref(), Some(b"hallo".as_slice()));
+        }
+        for text in ["aGFsbG8*", "a", "a="] {
+            assert_eq!(decode_base64(text.as_bytes()), None);
+        }
+        for uri in ["data:;base64,aGFs%62G8%3D", "DATA:text/plain;BASE64,aGFsbG8=", "Data:,hal%6Co"] {
+            assert_eq!(decode_data(data_of(uri).unwrap()).unwrap(), b"hallo", "{uri}");
+        }
+        assert_eq!([data_of("dat"), data_of("database.bin"), data_of("da\u{fc}a:")], [None; 3]);
     }
 }

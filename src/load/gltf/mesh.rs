@@ -59,6 +59,11 @@ impl Meshes {
         let mut triangles = 0;
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("{label}, primitive {i}");
+            if !has_surface(primitive) {
+                // It says so, or that nobody knows what it is.
+                read_primitive(document, primitive, [0; 2], None, &place, sink)?;
+                continue;
+            }
             let worn = document.material_of(primitive);
             let material = match worn {
                 Some(index) => *document.at(&palette.materials, &Index::new(index), "material", &place)?,
@@ -140,6 +145,11 @@ impl Meshes {
     }
 }
 
+fn has_surface(primitive: &Primitive) -> bool {
+    let surfaces = [Mode::Triangles, Mode::TriangleStrip, Mode::TriangleFan];
+    matches!(primitive.mode, Checked::Valid(mode) if surfaces.contains(&mode))
+}
+
 /// Reads what a primitive's triangles use; None if there are none.
 fn read_primitive(
     document: &Document<'_>,
@@ -153,7 +163,7 @@ fn read_primitive(
     let Checked::Valid(mode) = primitive.mode else {
         return Err(document.broken(place, "unknown mode (what the vertices form)"));
     };
-    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+    if !has_surface(primitive) {
         let what = format!("mode {} (points or lines) has no triangles", mode.as_gl_enum());
         sink.ignored(file, place, what);
         return Ok(None);

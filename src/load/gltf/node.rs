@@ -6,14 +6,17 @@ use super::mesh::Meshes;
 use super::place::{MOST_NODES, instantiate, place, placement};
 use super::{Document, animation, light, units};
 use crate::load::error::LoadError;
-use crate::load::report::{Kind, Sink};
-use crate::scene::{MorphWeights, Transform};
+use crate::load::report::Sink;
+use crate::scene::{Mesh, MorphWeights, Transform, TriangleMesh};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
-use glam::DAffine3;
-use gltf::json::Index;
+use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
+use gltf::json::{self, Index};
+
+/// A skinned mesh whose first joint is farther from zero is counted from there.
+const FAR_SKIN: f64 = 256.0;
 
 /// Spawns the default scene (else the first, else all root nodes) below `root`.
 pub(super) fn spawn_scene(
@@ -32,8 +35,11 @@ pub(super) fn spawn_scene(
         (0..nodes.len()).map(|i| placement(document, i, sink)).collect::<Result<_, _>>()?;
     let order = top_down(document, &roots);
     let hidden = hidden(document, &order, &parents, sink);
-    let mut flat: Vec<bool> = local.iter().map(|local| local.matrix3.determinant() == 0.0).collect();
-    order.iter().for_each(|&i| flat[i] |= parents[i].is_some_and(|parent| flat[parent]));
+    // Where those of the scene stand in the file as a whole.
+    let mut placed: Vec<Option<DAffine3>> = vec![None; nodes.len()];
+    for &i in &order {
+        placed[i] = Some(parents[i].and_then(|parent| placed[parent]).unwrap_or_default() * local[i]);
+    }
     let mut entities: Vec<Option<Entity>> = vec![None; nodes.len()];
     let before = sink.spawned().len();
     let mut meshes = Meshes::default();
@@ -67,16 +73,13 @@ pub(super) fn spawn_scene(
         let (node, user) = (&nodes[i], format!("node {i}"));
         let (Some(index), Some(entity), false) = (&node.mesh, entities[i], hidden[i]) else { continue };
         let mesh = document.at(&document.root.meshes, index, "mesh", &user)?;
-        if flat[i] && node.skin.is_none() {
-            let what = "scaled to nothing: its mesh is flat, or not to be seen";
-            sink.remark(Kind::Approximated, document.file, &user, what.to_owned(), 1);
-        }
+        let here = placed[i].unwrap_or_default();
+        let is_moved = document.animations.good().is_some_and(|all| !all.is_empty());
         let weights = deform::weights_of(document, node, mesh, &user)?;
-        let morphs = weights.iter().any(|&weight| weight != 0.0)
-            || (!weights.is_empty() && document.animations.good().is_some_and(|all| !all.is_empty()));
-        // The format: the transform of a skinned mesh's own node does not count.
-        let holder = node.skin.as_ref().map(|_| {
-            sink.spawn((Name::new(format!("{user} (skinned)")), Transform::default(), ChildOf(root)))
+        let morphs = weights.iter().any(|&weight| weight != 0.0) || (!weights.is_empty() && is_moved);
+        let holder = node.skin.as_ref().map(|skin| {
+            let place = Transform(skin_place(document, skin, &placed, here));
+            sink.spawn((Name::new(format!("{user} (skinned)")), place, ChildOf(root)))
         });
         let skin = match node.skin.as_ref().zip(holder) {
             Some((index, holder)) => Some(deform::skin(document, index, &entities, holder, &user, sink)?),
@@ -87,6 +90,15 @@ pub(super) fn spawn_scene(
             sink.world.entity_mut(entity).insert(MorphWeights(weights));
         }
         let built = meshes.get(document, index, follower, &mut palette, &user, sink)?;
+        if here.matrix3.determinant() == 0.0
+            && !is_moved
+            && built
+                .entity
+                .and_then(|mesh| sink.world.get::<Mesh>(mesh))
+                .is_some_and(|m| vanishes(&m.0, here))
+        {
+            sink.ignored(document.file, &user, "scaled to nothing: not to be seen");
+        }
         match holder {
             Some(holder) => instantiate(&built, holder, sink),
             None => place(document, node, entity, &built, &user, sink)?,
@@ -108,6 +120,31 @@ pub(super) fn spawn_scene(
         return Err(document.broken("meshes", "no POSITION in any: nothing says where vertices are"));
     }
     animation::spawn_all(document, &entities, sink)
+}
+
+/// Whether a mesh placed so has no area anywhere: what is flat may still be seen.
+fn vanishes(mesh: &TriangleMesh, placed: DAffine3) -> bool {
+    (0..mesh.triangles.len()).all(|triangle| {
+        let [a, b, c] = mesh.corners(triangle).map(|corner| placed.transform_point3(corner.as_dvec3()));
+        let (u, v) = (b - a, c - a);
+        u.cross(v).length() <= 1e-12 * u.length() * v.length()
+    })
+}
+
+/// Where a skinned mesh is counted from. The format: the transform of its own node `here` does not count; but whether that
+/// mirrors decides which side of its triangles is their front (section 3.7.4).
+fn skin_place(
+    document: &Document<'_>,
+    skin: &Index<json::Skin>,
+    placed: &[Option<DAffine3>],
+    here: DAffine3,
+) -> DAffine3 {
+    let mirror = if here.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let joint = document.root.skins.get(skin.value()).and_then(|skin| skin.joints.first());
+    let joint = joint.and_then(|joint| *placed.get(joint.value())?);
+    // Far from zero single precision would dent it.
+    let place = joint.map(|joint| joint.translation).filter(|place| place.abs().max_element() > FAR_SKIN);
+    DAffine3::from_translation(place.unwrap_or_default()) * DAffine3::from_scale(DVec3::new(mirror, 1.0, 1.0))
 }
 
 /// Parent of each node; refuses children that do not exist, second parents and cycles.

@@ -5,7 +5,7 @@ use super::mesh::Built;
 use super::parse::Placement;
 use crate::load::error::LoadError;
 use crate::load::report::Sink;
-use crate::scene::{Instance, Transform};
+use crate::scene::{Instance, Pose, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
@@ -43,7 +43,17 @@ pub(super) fn place(
     };
     let (translation, rotation, scale) = (open("TRANSLATION", 3)?, open("ROTATION", 4)?, open("SCALE", 3)?);
     let counts = || [&translation, &rotation, &scale].into_iter().flatten().map(|elements| elements.count);
-    let count = counts().max().unwrap_or(0);
+    let count = match counts().max() {
+        Some(count) => count,
+        // Those that have a number or a colour and no place stand all on the node.
+        None => match lists.as_object().and_then(|lists| lists.values().next()?.as_u64()) {
+            Some(index) => {
+                let index = Index::new(u32::try_from(index).unwrap_or(u32::MAX));
+                document.elements(&index, &format!("{user}, instances"))?.count
+            }
+            None => 0,
+        },
+    };
     if counts().any(|other| other != count) || sink.spawned().len() + count > MOST_NODES {
         return Err(document.broken(user, "instances: lists of unequal or too large count"));
     }
@@ -78,14 +88,30 @@ impl Placement {
             let is_affine = matrix.row(3) == glam::DVec4::W;
             return (DAffine3::from_mat4(matrix), !is_affine);
         }
-        let [x, y, z, w] = self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
-        let stored = DQuat::from_xyzw(x, y, z, w);
+        let length = self.stored_rotation().length();
+        (Transform::from(self.parts()).0, (length - 1.0).abs() > 1e-2 || !length.is_finite())
+    }
+
+    /// What animations move one by one. Of a matrix, which the format does not let them move, one of its partings.
+    pub(super) fn pose(&self) -> Pose {
+        if self.matrix.is_none() {
+            return self.parts();
+        }
+        let (scale, rotation, translation) = self.affine().0.to_scale_rotation_translation();
+        Pose { translation, rotation, scale }
+    }
+
+    /// As the file has them: nobody can tell from their product which axes are mirrored, or how what has no size is turned.
+    fn parts(&self) -> Pose {
+        let stored = self.stored_rotation();
         let length = stored.length();
         let rotation = if length > 0.0 && length.is_finite() { stored / length } else { DQuat::IDENTITY };
         let translation = self.translation.map_or(DVec3::ZERO, DVec3::from);
-        let scale = self.scale.map_or(DVec3::ONE, DVec3::from);
-        let affine = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
-        (affine, (length - 1.0).abs() > 1e-2 || !length.is_finite())
+        Pose { translation, rotation, scale: self.scale.map_or(DVec3::ONE, DVec3::from) }
+    }
+
+    fn stored_rotation(&self) -> DQuat {
+        DQuat::from_array(self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]))
     }
 }
 

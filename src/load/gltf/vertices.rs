@@ -82,7 +82,11 @@ fn triangles_of(mode: Mode, count: usize, vertex: impl Fn(usize) -> u32) -> Vec<
     let corners = |[a, b, c]: [usize; 3]| [vertex(a), vertex(b), vertex(c)];
     let strip = count.saturating_sub(2);
     match mode {
-        Mode::TriangleStrip => (0..strip).map(|i| corners([i, i + 1 + i % 2, i + 2 - i % 2])).collect(),
+        // A corner twice is a stitch between two strips.
+        Mode::TriangleStrip => (0..strip)
+            .map(|i| corners([i, i + 1 + i % 2, i + 2 - i % 2]))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect(),
         Mode::TriangleFan => (0..strip).map(|i| corners([i + 1, i + 2, 0])).collect(),
         _ => (0..count / 3).map(|i| corners([3 * i, 3 * i + 1, 3 * i + 2])).collect(),
     }

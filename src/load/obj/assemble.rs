@@ -1,6 +1,7 @@
 //! Faces of an OBJ file → one indexed triangle mesh.
 
 use super::numbers::NONE;
+use super::parts::Kinds;
 use super::polygon;
 use super::raw::{Corner, Raw};
 use crate::scene::TriangleMesh;
@@ -10,14 +11,22 @@ use std::collections::HashMap;
 /// Vertices at one position that are looked at to find a twin.
 const MOST_STEPS: usize = 64;
 
-/// Cuts all faces into triangles; corners that agree in everything share a vertex. For each triangle what `parts` says of its face.
-pub(super) fn mesh(raw: &Raw, parts: &[u32]) -> (TriangleMesh, Vec<u32>) {
+/// Faces as triangles.
+pub(super) struct Cut {
+    pub(super) mesh: TriangleMesh,
+    /// Faces whose triangles may not cover them.
+    pub(super) given_up: usize,
+}
+
+/// Cuts all faces into triangles; corners that agree in everything share a vertex. `kinds` of faces are the slots, if there are
+/// several.
+pub(super) fn mesh(raw: &Raw, kinds: &Kinds) -> Cut {
     let normals = Normals::new(raw);
     let mut vertices = Vertices::new(raw, &normals);
     let mut corners: Vec<u32> = Vec::new();
     let mut points: Vec<DVec3> = Vec::new();
-    let mut part_of = Vec::new();
-    let several_materials = raw.materials.len() > 1;
+    let has_several = kinds.kinds.len() > 1;
+    let mut given_up = 0;
     for (i, face) in raw.faces.iter().enumerate() {
         corners.clear();
         corners.extend(
@@ -27,16 +36,14 @@ pub(super) fn mesh(raw: &Raw, parts: &[u32]) -> (TriangleMesh, Vec<u32>) {
         points.extend(
             raw.corners_of(i).iter().map(|corner| raw.positions[corner.position as usize].as_dvec3()),
         );
-        let triangles = polygon::triangulate(&points);
+        let (triangles, is_right) = polygon::triangulate(&points);
+        given_up += usize::from(!is_right);
         vertices.mesh.triangles.extend(triangles.iter().map(|t| t.map(|corner| corners[corner])));
-        if several_materials {
-            vertices.mesh.slots.resize(vertices.mesh.triangles.len(), face.material);
-        }
-        if let Some(&part) = parts.get(i) {
-            part_of.resize(vertices.mesh.triangles.len(), part);
+        if has_several {
+            vertices.mesh.slots.resize(vertices.mesh.triangles.len(), kinds.of_faces[i]);
         }
     }
-    (vertices.mesh, part_of)
+    Cut { mesh: vertices.mesh, given_up }
 }
 
 /// The normals of the file and, after them, those that are made here.

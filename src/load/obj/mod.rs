@@ -29,14 +29,15 @@ mod vtk;
 use super::error::LoadError;
 use super::first_bytes::not_a_scene;
 use super::geometry;
-use super::report::{Phase, Sink};
+use super::report::{Kind, Phase, Sink};
 use super::settings::Materials;
 use super::source::{Bytes, Folder};
 use super::tangents;
-use crate::scene::{Instance, Material, Mesh, Transform, TriangleMesh};
+use crate::scene::{Instance, Material, Mesh, Transform};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3, Vec3};
+use parts::Kinds;
 use raw::Raw;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -90,39 +91,46 @@ pub(super) fn load(
         let place = Transform(DAffine3::from_translation(raw.origin));
         sink.spawn((Name::new("place"), place, ChildOf(root)))
     };
-    let (parts, names) = parts::parts(&raw.objects, &raw.groups, raw.faces.len()).unwrap_or_default();
-    let (whole, part) = assemble::mesh(&raw, &parts);
-    if part.is_empty() {
-        if let Some(what) = parts::told(&raw.objects, &raw.groups) {
-            sink.decide(file, what);
-        }
-        spawn(file, "", whole, materials, holder, sink);
-        return Ok(());
-    }
-    for ((mesh, slots), name) in parts::split(&whole, &part, names.len()).into_iter().zip(names) {
-        let materials = slots.iter().map(|&slot| materials[usize::from(slot)]).collect();
-        let thing = sink.spawn((Name::new(name.clone()), Transform::default(), ChildOf(holder)));
-        spawn(file, &name, mesh, materials, thing, sink);
-    }
+    spawn_things(file, &raw, &materials, holder, sink);
     Ok(())
 }
 
-/// Puts `mesh` on `holder`, if there is anything of it to see.
-fn spawn(
-    file: &str,
-    place: &str,
-    mesh: TriangleMesh,
-    materials: Vec<Entity>,
-    holder: Entity,
-    sink: &mut Sink<'_>,
-) {
-    let mut done = geometry::finish(mesh, false, |_| true);
-    tangents::complete_for(&mut done.mesh, &materials, file, place, sink);
-    done.mended.tell(file, place, sink);
+/// Puts the mesh on `holder`, or its parts below it.
+fn spawn_things(file: &str, raw: &Raw, materials: &[Entity], holder: Entity, sink: &mut Sink<'_>) {
+    let (of_faces, names) = parts::of_faces(&raw.objects, &raw.groups, raw.faces.len());
+    let kinds = Kinds::new(&raw.faces, &of_faces);
+    let cut = assemble::mesh(raw, &kinds);
+    if cut.given_up > 0 {
+        let what = "faces of so many corners that they were not cut up rightly: part them".to_owned();
+        sink.remark(Kind::Approximated, file, "", what, cut.given_up);
+    }
+    // As a whole, so that normals and directions go on from part to part.
+    let mut done = geometry::finish(cut.mesh, false, |_| true);
+    let worn: Vec<Entity> =
+        kinds.kinds.iter().map(|&(_, material)| materials[usize::from(material)]).collect();
+    tangents::complete_for(&mut done.mesh, &worn, file, "", sink);
+    done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
-    if !done.mesh.triangles.is_empty() {
-        let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(done.mesh))));
-        sink.world.entity_mut(holder).insert(Instance { mesh, materials });
+    let lies_apart = parts::overlap(&done.mesh, &kinds.kinds) <= parts::MOST_OVERLAP;
+    if let Some(what) = parts::told(&raw.objects, &raw.groups, names.len(), lies_apart) {
+        sink.decide(file, what);
+    }
+    let things = if names.len() > 1 && lies_apart {
+        parts::split(&done.mesh, &kinds.kinds, names.len())
+            .into_iter()
+            .zip(names.into_iter().map(Some))
+            .collect()
+    } else {
+        vec![(kinds.as_materials(done.mesh), None)]
+    };
+    for ((mesh, slots), name) in things.into_iter().filter(|((mesh, _), _)| !mesh.triangles.is_empty()) {
+        let materials = slots.iter().map(|&slot| materials[usize::from(slot)]).collect();
+        let mesh = sink.spawn((Name::new("mesh"), Mesh(Arc::new(mesh))));
+        let thing = match name {
+            Some(name) => sink.spawn((Name::new(name), Transform::default(), ChildOf(holder))),
+            None => holder,
+        };
+        sink.world.entity_mut(thing).insert(Instance { mesh, materials });
     }
 }
 

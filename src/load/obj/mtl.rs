@@ -171,15 +171,21 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let is_mapped = |keyword: &str| material.unknown_param.contains_key(keyword);
     let mut diffuse =
         unit("Kd", material.diffuse.map_or(Vec3::splat(if has_texture { 1.0 } else { 0.8 }), Vec3::from));
-    if material.specular.is_none() && material.specular_texture.is_some() && !is_mapped(blender::GLOSS) {
-        let what = "map_Ks without Ks, which says how much: left out";
+    let no_specular = material.specular.is_none_or(|specular| specular == [0.0; 3]);
+    if no_specular && material.specular_texture.is_some() && !is_mapped(blender::GLOSS) {
+        let what = "map_Ks without Ks, which says how much, or with a black one: left out";
         sink.ignored(file, &format!("material `{name}`"), what);
     }
     let mut specular = unit("Ks", material.specular.map_or(Vec3::ZERO, Vec3::from));
     let tint = unit("Tf", color(material, "Tf").unwrap_or(Vec3::ONE));
     // A map alone is the value itself; what stands in for one that is not there is no lamp.
     let unsaid = if textures.has(material, "map_Ke") { Vec3::ONE } else { Vec3::ZERO };
-    let emission = material.emissive.map_or(unsaid, Vec3::from).max(Vec3::ZERO);
+    let mut emission = material.emissive.map_or(unsaid, Vec3::from).max(Vec3::ZERO);
+    if emission == Vec3::ZERO && unsaid != Vec3::ZERO {
+        let what = "Ke is black, and map_Ke would not be seen: as if it were white";
+        sink.repaired(file, &format!("material `{name}`"), what);
+        emission = unsaid;
+    }
     let exponent = within("Ns", material.shininess.unwrap_or(0.0), 0.0, 1e6);
     let opacity = material
         .dissolve
@@ -189,7 +195,12 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
                 .filter(|&transparency| transparency < 1.0)
                 .map(|transparency| 1.0 - transparency)
         });
-    let opacity = within("d", opacity.unwrap_or(1.0), 0.0, 1.0);
+    let mut opacity = within("d", opacity.unwrap_or(1.0), 0.0, 1.0);
+    if opacity == 0.0 && textures.has(material, "map_d") {
+        let what = "d is 0, and map_d would not be seen: as if it were 1";
+        sink.repaired(file, &format!("material `{name}`"), what);
+        opacity = 1.0;
+    }
     let mut fraction =
         |keyword: &str| scalar(material, keyword).map(|value| within(keyword, value, 0.0, 1.0));
     let is_pbr = ["Pr", "Pm", "map_Pr", "map_Pm"].iter().any(|keyword| is_mapped(keyword))
@@ -249,7 +260,10 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
     let is_bent = material.optical_density.is_some_and(|ior| ior > 1.0) && is_whole;
     let is_tinted = tint != Vec3::ONE && tint != Vec3::ZERO;
     let is_black = diffuse == Vec3::ZERO && !has_texture;
-    let is_glass = passes && (is_bent || is_tinted || is_black) && !has_texture;
+    // A filter of 0 lets nothing pass. Some programs write so what lets all pass: where there is nothing else to be seen.
+    let is_dark = tint == Vec3::ZERO && !is_black;
+    let is_glass = passes && !is_dark && (is_bent || is_tinted || is_black) && !has_texture;
+    let tint = if tint == Vec3::ZERO { Vec3::ONE } else { tint };
     if material.ambient_texture.is_some() && !has_texture {
         sink.ignored(file, &format!("material `{name}`"), "map_Ka without map_Kd: the picture is not seen");
     }
@@ -271,6 +285,7 @@ fn convert(file: &str, material: &tobj::Material, textures: &mut Textures, sink:
         let what = match opacity < 1.0 {
             _ if has_texture => format!("illum {model} with map_Kd: no glass, but its picture"),
             true => format!("illum {model} with d {opacity}: half-transparent, no glass"),
+            false if is_dark => format!("illum {model} with Tf 0, which lets no light through: no glass"),
             false => format!("illum {model} without Ni above 1, Tf or black Kd: no glass, but its Kd"),
         };
         sink.remark(Kind::Decided, file, &format!("material `{name}`"), what, 1);

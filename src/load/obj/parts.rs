@@ -1,13 +1,18 @@
 //! The things that a file names, each a mesh of its own: who clicks a chair means the chair.
 //!
-//! They are what `o` names or, where no two objects have faces, what `g` does. A file of very many of them is one thing: so
-//! many boxes overlap that rays would pay for it, and nobody picks one by one.
+//! They are what `o` names or, where no two objects have faces, what `g` does. A file of very many of them is one thing: nobody
+//! picks these one by one. So is one whose parts lie through one another, as leaves of one kind or all that is of one material:
+//! each ray would have to enter all of their boxes.
 
+use super::raw::Face;
+use crate::bvh::Aabb;
 use crate::scene::TriangleMesh;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// With more named things than this a file is one thing.
 pub(super) const MOST_PARTS: usize = 512;
+/// So often the boxes of the parts may cover that of the whole. With 16 to 500 that each fill it rays took 2.3 to 22 times as long.
+pub(super) const MOST_OVERLAP: f32 = 4.0;
 /// Letters of a name.
 const MOST_LETTERS: usize = 200;
 /// Stretches of faces under one name: many names may take turns.
@@ -53,7 +58,7 @@ impl Names {
 
     /// Whether no part of the file is a thing of its own because there are too many.
     fn is_crowded(&self) -> bool {
-        self.crowded || self.names.len() > MOST_PARTS
+        self.crowded || self.runs.iter().map(|(_, name)| name).collect::<HashSet<_>>().len() > MOST_PARTS
     }
 
     /// For each face the number of its part, and the names of the parts in the order of their first faces; nothing if all are one.
@@ -78,30 +83,102 @@ impl Names {
     }
 }
 
-/// What is to be said of a file that is one thing for it has too many.
-pub(super) fn told(objects: &Names, groups: &Names) -> Option<String> {
-    let crowded = [(objects, "objects (`o`)"), (groups, "groups (`g`)")];
-    let (_, what) = crowded.into_iter().find(|(names, _)| names.is_crowded())?;
-    Some(format!("more than {MOST_PARTS} {what}: they are one thing, to be moved as a whole"))
+/// Parts of a file: for each face its part, and their names; nothing if all are one.
+pub(super) fn of_faces(objects: &Names, groups: &Names, faces: usize) -> (Vec<u32>, Vec<String>) {
+    objects.parts(faces).or_else(|| groups.parts(faces)).unwrap_or_default()
 }
 
-/// What a file is made of: for each face its part, and their names.
-pub(super) fn parts(objects: &Names, groups: &Names, faces: usize) -> Option<(Vec<u32>, Vec<String>)> {
-    objects.parts(faces).or_else(|| groups.parts(faces))
+/// What is to be said of a file of `parts` whose names are not all things of their own.
+pub(super) fn told(objects: &Names, groups: &Names, parts: usize, lie_apart: bool) -> Option<String> {
+    let is_parted = parts > 1 && lie_apart;
+    let why = match (objects.is_crowded(), groups.is_crowded()) {
+        (true, _) => format!("more than {MOST_PARTS} objects (`o`)"),
+        (false, true) if parts < 2 => format!("more than {MOST_PARTS} groups (`g`)"),
+        _ if parts > 1 && !lie_apart => "its objects or groups lie through one another".to_owned(),
+        _ => return None,
+    };
+    let instead = if is_parted { "its groups (`g`) are things instead" } else { "they are one thing" };
+    Some(format!("{why}: {instead}"))
 }
 
-/// Triangles of `mesh` by their `part`, of which there are `count`; and of each which of the slots it has.
-pub(super) fn split(mesh: &TriangleMesh, part: &[u32], count: usize) -> Vec<(TriangleMesh, Vec<u16>)> {
-    const NONE: u32 = u32::MAX;
-    let mut triangles: Vec<Vec<u32>> = vec![Vec::new(); count];
-    for (triangle, &part) in part.iter().enumerate() {
-        triangles[part as usize].push(triangle as u32);
+/// What of a part has one material. In a mesh of the whole these are the slots.
+#[derive(Default)]
+pub(super) struct Kinds {
+    /// By face.
+    pub(super) of_faces: Vec<u16>,
+    /// By kind: part and material.
+    pub(super) kinds: Vec<(u32, u16)>,
+}
+
+impl Kinds {
+    /// Of faces in these parts; in one, if these are none or give more kinds than a mesh has slots.
+    pub(super) fn new(faces: &[Face], parts: &[u32]) -> Self {
+        Self::of(faces, parts).or_else(|| Self::of(faces, &[])).unwrap_or_default()
     }
-    // By vertex of the whole, the part that used it last and what it is called there.
+
+    fn of(faces: &[Face], parts: &[u32]) -> Option<Self> {
+        let (mut kinds, mut known) = (Vec::new(), HashMap::new());
+        let mut of_faces = Vec::with_capacity(faces.len());
+        let mut last = None;
+        for (i, face) in faces.iter().enumerate() {
+            let kind = (parts.get(i).copied().unwrap_or(0), face.material);
+            let number = match last.filter(|(before, _)| *before == kind) {
+                Some((_, number)) => number,
+                None => *known.entry(kind).or_insert_with(|| {
+                    kinds.push(kind);
+                    kinds.len() - 1
+                }),
+            };
+            last = Some((kind, number));
+            of_faces.push(u16::try_from(number).ok()?);
+        }
+        Some(Self { of_faces, kinds })
+    }
+
+    /// The whole mesh with materials as slots; and all of these.
+    pub(super) fn as_materials(&self, mut mesh: TriangleMesh) -> (TriangleMesh, Vec<u16>) {
+        let count = self.kinds.iter().map(|&(_, material)| material + 1).max().unwrap_or(0);
+        if count < 2 {
+            mesh.slots = Vec::new();
+        }
+        for slot in &mut mesh.slots {
+            *slot = self.kinds[usize::from(*slot)].1;
+        }
+        (mesh, (0..count).collect())
+    }
+}
+
+/// How often boxes of the parts cover that of the whole, by their areas: so many hierarchies a ray has to enter.
+pub(super) fn overlap(mesh: &TriangleMesh, kinds: &[(u32, u16)]) -> f32 {
+    let parts = kinds.iter().map(|&(part, _)| part as usize + 1).max().unwrap_or(0);
+    let mut boxes = vec![Aabb::EMPTY; parts];
+    for triangle in 0..mesh.triangles.len() {
+        let own = &mut boxes[kinds[mesh.slot(triangle)].0 as usize];
+        *own = mesh.corners(triangle).into_iter().fold(*own, Aabb::with);
+    }
+    let whole = boxes.iter().fold(Aabb::EMPTY, |whole, own| whole.union(*own));
+    let area = |aabb: &Aabb| if aabb.is_empty() { 0.0 } else { f64::from(aabb.half_area()) };
+    let all: f64 = boxes.iter().map(area).sum();
+    (all / area(&whole).max(f64::MIN_POSITIVE)) as f32
+}
+
+/// The parts of `mesh`, whose slots are `kinds`; and of each which materials its slots are.
+pub(super) fn split(
+    mesh: &TriangleMesh,
+    kinds: &[(u32, u16)],
+    parts: usize,
+) -> Vec<(TriangleMesh, Vec<u16>)> {
+    const NONE: u32 = u32::MAX;
+    let mut triangles: Vec<Vec<u32>> = vec![Vec::new(); parts];
+    for triangle in 0..mesh.triangles.len() {
+        triangles[kinds[mesh.slot(triangle)].0 as usize].push(triangle as u32);
+    }
+    // By vertex of the whole, the part that used it last and what it is called there; by kind its slot in its part.
     let mut called = vec![(NONE, 0); mesh.positions.len()];
+    let mut slot_of = vec![u16::MAX; kinds.len()];
     let own = |(part, triangles): (u32, Vec<u32>)| {
         let mut vertices: Vec<u32> = Vec::new();
-        let mut slots: Vec<u16> = Vec::new();
+        let mut materials: Vec<u16> = Vec::new();
         let mut split = TriangleMesh::default();
         for triangle in triangles {
             let corners = mesh.triangles[triangle as usize].map(|vertex| {
@@ -113,21 +190,22 @@ pub(super) fn split(mesh: &TriangleMesh, part: &[u32], count: usize) -> Vec<(Tri
                 place.1
             });
             split.triangles.push(corners);
-            let slot = mesh.slot(triangle as usize) as u16;
-            let known = slots.iter().position(|&known| known == slot).unwrap_or_else(|| {
-                slots.push(slot);
-                slots.len() - 1
-            });
-            split.slots.push(known as u16);
+            let kind = mesh.slot(triangle as usize);
+            if slot_of[kind] == u16::MAX {
+                slot_of[kind] = materials.len() as u16;
+                materials.push(kinds[kind].1);
+            }
+            split.slots.push(slot_of[kind]);
         }
-        if slots.len() < 2 {
+        if materials.len() < 2 {
             split.slots = Vec::new();
         }
         split.positions = taken(&mesh.positions, &vertices);
         split.normals = taken(&mesh.normals, &vertices);
         split.uvs = taken(&mesh.uvs, &vertices);
+        split.tangents = taken(&mesh.tangents, &vertices);
         split.colors = taken(&mesh.colors, &vertices);
-        (split, slots)
+        (split, materials)
     };
     (0..).zip(triangles).map(own).collect()
 }

@@ -2,27 +2,28 @@
 
 use glam::{DVec2, DVec3};
 
-/// Inside-tests that one polygon may cost before the rest of it becomes a fan.
+/// Inside-tests that one polygon may cost before the rest of it is cut anyhow.
 const MOST_TESTS: usize = 50_000_000;
 
-/// Corners of `n - 2` triangles that cover the polygon with its area, each turning as it does.
+/// Corners of `n - 2` triangles that cover the polygon with its area, each turning as it does; and whether it was not given up
+/// for all its corners.
 ///
 /// A fan where that is right (all convex polygons), else ear clipping in the polygon's plane (of
 /// Newell's normal). What crosses itself or has no area gets some triangles.
-pub(super) fn triangulate(points: &[DVec3]) -> Vec<[usize; 3]> {
+pub(super) fn triangulate(points: &[DVec3]) -> (Vec<[usize; 3]>, bool) {
     let n = points.len();
     if n < 3 {
-        return Vec::new();
+        return (Vec::new(), true);
     }
     if n == 3 {
-        return vec![[0, 1, 2]];
+        return (vec![[0, 1, 2]], true);
     }
     let Some(flat) = project(points) else {
-        return fan(n, 0);
+        return (fan(n, 0), true);
     };
     let starts = if n <= 8 { n } else { 1 };
     match (0..starts).find(|&start| fan_covers(&flat, start)) {
-        Some(start) => fan(n, start),
+        Some(start) => (fan(n, start), true),
         None => clip_ears(&flat),
     }
 }
@@ -60,27 +61,34 @@ fn fan_covers(points: &[DVec2], start: usize) -> bool {
     (1..n - 1).all(|i| turn(points[start], points[(start + i) % n], points[(start + i + 1) % n]) >= slack)
 }
 
-/// Cuts off ears until three corners are left. Quadratic in the corners, times the concave ones.
-fn clip_ears(points: &[DVec2]) -> Vec<[usize; 3]> {
+/// Cuts off ears until three corners are left. An ear holds no other corner; if any, then one where the polygon is not convex,
+/// and of these a grid knows which are near.
+fn clip_ears(points: &[DVec2]) -> (Vec<[usize; 3]>, bool) {
     let n = points.len();
     let mut next: Vec<usize> = (1..n).chain([0]).collect();
     let mut previous: Vec<usize> = [n - 1].into_iter().chain(0..n - 1).collect();
     let mut triangles = Vec::with_capacity(n - 2);
-    let (mut here, mut left, mut tried, mut tests) = (0, n, 0, 0);
+    let (mut here, mut left, mut tried) = (0, n, 0);
+    let mut hollows = Hollows::new(points);
     // A corner that is flat is cut last: it may still be needed to reach across.
     let mut accept_flat = false;
     while left > 3 {
         let (a, c) = (previous[here], next[here]);
         let area = turn(points[a], points[here], points[c]);
-        let desperate = tried > 2 * left || tests > MOST_TESTS;
+        let desperate = tried > 2 * left || hollows.tests > MOST_TESTS;
         let is_ear = area > 0.0 || (area == 0.0 && accept_flat);
-        if desperate || (is_ear && !holds_a_corner(points, &next, [a, here, c], &mut tests)) {
+        if desperate || (is_ear && !hollows.any_in([a, here, c])) {
             triangles.push([a, here, c]);
             next[a] = c;
             previous[c] = a;
             left -= 1;
             tried = 0;
             accept_flat = false;
+            hollows.is_one[here] = false;
+            for corner in [a, c] {
+                let (before, after) = (points[previous[corner]], points[next[corner]]);
+                hollows.is_one[corner] &= turn(before, points[corner], after) <= 0.0;
+            }
             here = c;
         } else {
             tried += 1;
@@ -89,23 +97,73 @@ fn clip_ears(points: &[DVec2]) -> Vec<[usize; 3]> {
         }
     }
     triangles.push([previous[here], here, next[here]]);
-    triangles
+    (triangles, hollows.tests <= MOST_TESTS)
 }
 
-/// Whether another corner lies in the triangle. One at the same place as a tip does not count.
-fn holds_a_corner(points: &[DVec2], next: &[usize], [a, b, c]: [usize; 3], tests: &mut usize) -> bool {
-    let [pa, pb, pc] = [a, b, c].map(|i| points[i]);
-    let mut other = next[c];
-    while other != a {
-        *tests += 1;
-        let p = points[other];
-        let is_tip = p == pa || p == pb || p == pc;
-        if !is_tip && turn(pa, pb, p) >= 0.0 && turn(pb, pc, p) >= 0.0 && turn(pc, pa, p) >= 0.0 {
-            return true;
+/// Corners where the polygon is not convex, by where they are.
+struct Hollows<'a> {
+    points: &'a [DVec2],
+    /// By corner. None becomes one while ears are cut off, but some no longer are.
+    is_one: Vec<bool>,
+    low: DVec2,
+    /// Of a cell.
+    size: DVec2,
+    across: usize,
+    /// Rows of cells, those of a row from left to right.
+    cells: Vec<Vec<u32>>,
+    tests: usize,
+}
+
+impl<'a> Hollows<'a> {
+    fn new(points: &'a [DVec2]) -> Self {
+        let n = points.len();
+        let around = |i: usize| [(i + n - 1) % n, i, (i + 1) % n].map(|corner| points[corner]);
+        let is_hollow = |i: usize| {
+            let [before, here, after] = around(i);
+            turn(before, here, after) <= 0.0
+        };
+        let is_one: Vec<bool> = (0..n).map(is_hollow).collect();
+        let low = points.iter().fold(DVec2::INFINITY, |low, point| low.min(*point));
+        let high = points.iter().fold(DVec2::NEG_INFINITY, |high, point| high.max(*point));
+        let count = is_one.iter().filter(|&&is_one| is_one).count();
+        let across = ((count as f64).sqrt() as usize).clamp(1, 1024);
+        let size = (high - low) / across as f64;
+        let mut hollows =
+            Self { points, is_one, low, size, across, cells: vec![Vec::new(); across * across], tests: 0 };
+        for corner in (0..n).filter(|&corner| hollows.is_one[corner]) {
+            let [x, y] = hollows.cell(points[corner]);
+            hollows.cells[y * across + x].push(corner as u32);
         }
-        other = next[other];
+        hollows
     }
-    false
+
+    fn cell(&self, point: DVec2) -> [usize; 2] {
+        // Where all are on a line, cells have no size: what is no number becomes 0.
+        let place = ((point - self.low) / self.size).to_array();
+        place.map(|place| (place as usize).min(self.across - 1))
+    }
+
+    /// Whether one lies in the triangle. One at the same place as a tip does not count.
+    fn any_in(&mut self, triangle: [usize; 3]) -> bool {
+        let [a, b, c] = triangle.map(|corner| self.points[corner]);
+        let [left, bottom] = self.cell(a.min(b).min(c));
+        let [right, top] = self.cell(a.max(b).max(c));
+        let cells = (bottom..=top).flat_map(|y| (left..=right).map(move |x| [x, y]));
+        for [x, y] in cells {
+            let cell = &mut self.cells[y * self.across + x];
+            cell.retain(|&corner| self.is_one[corner as usize]);
+            self.tests += 1 + cell.len();
+            let holds = |&corner: &u32| {
+                let p = self.points[corner as usize];
+                let is_tip = p == a || p == b || p == c;
+                !is_tip && turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0
+            };
+            if cell.iter().any(holds) {
+                return true;
+            }
+        }
+        false
+    }
 }
 
 #[cfg(test)]
@@ -113,7 +171,8 @@ mod tests {
     use super::*;
 
     fn area(points: &[DVec3]) -> f64 {
-        let triangles = triangulate(points);
+        let (triangles, is_right) = triangulate(points);
+        assert!(is_right);
         assert_eq!(triangles.len(), points.len() - 2);
         let normal = newell(points);
         let parts = triangles.iter().map(|t| {
@@ -146,6 +205,25 @@ mod tests {
         assert!((area(&comb) - newell(&comb).length() / 2.0).abs() < 1e-9);
     }
 
+    /// Coastlines, gears and spirals of CAD and maps, with as many corners.
+    #[test]
+    fn outlines_of_very_many_corners_keep_their_area() {
+        let at = |angle: f64, radius: f64| DVec3::new(radius * angle.cos(), 0.5, radius * angle.sin());
+        let n = 60_000;
+        let part = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+        let gear: Vec<DVec3> = (0..n).map(|i| at(-part(i), if i / 2 % 2 == 0 { 1.0 } else { 0.8 })).collect();
+        let coast: Vec<DVec3> = (0..n)
+            .map(|i| at(part(i), 1.0 + 0.2 * (7.0 * part(i)).sin() + 0.01 * ((i * i % 101) as f64 / 101.0)))
+            .collect();
+        let arm = |i: usize| 0.1 + 0.9 * i as f64 / n as f64;
+        let spiral = (0..n / 2).map(|i| at(12.0 * part(2 * i), arm(2 * i)));
+        let back = (0..n / 2).rev().map(|i| at(12.0 * part(2 * i), arm(2 * i) - 0.02));
+        for outline in [gear, coast, spiral.chain(back).collect()] {
+            let right = newell(&outline).length() / 2.0;
+            assert!((area(&outline) / right - 1.0).abs() < 1e-9, "{right}");
+        }
+    }
+
     #[test]
     fn collinear_corners_lose_no_area() {
         let square =
@@ -156,8 +234,8 @@ mod tests {
     #[test]
     fn hopeless_polygons_still_end() {
         let bow_tie = [[0., 0.], [1., 1.], [1., 0.], [0., 1.]].map(|[x, y]| DVec3::new(x, y, 0.));
-        assert_eq!(triangulate(&bow_tie).len(), 2);
-        assert_eq!(triangulate(&[DVec3::ONE; 5]).len(), 3);
-        assert_eq!(triangulate(&[DVec3::ONE; 2]).len(), 0);
+        assert_eq!(triangulate(&bow_tie).0.len(), 2);
+        assert_eq!(triangulate(&[DVec3::ONE; 5]).0.len(), 3);
+        assert_eq!(triangulate(&[DVec3::ONE; 2]).0.len(), 0);
     }
 }

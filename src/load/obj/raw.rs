@@ -116,8 +116,9 @@ impl Raw {
             POLYPAINT => self.painted.extend(bytes_of(statement.rest).map(|[_, r, g, b]| [r, g, b])),
             other => {
                 // Some old programs shout.
-                let lower =
-                    ["v", "vt", "vn", "f"].into_iter().find(|known| known.eq_ignore_ascii_case(other));
+                let lower = ["v", "vt", "vn", "f", "g", "o", "s", "usemtl", "mtllib"]
+                    .into_iter()
+                    .find(|known| known.eq_ignore_ascii_case(other));
                 match lower {
                     Some(keyword) => return self.read(file, &Statement { keyword, ..*statement }),
                     None => self.skip(Skipped::Unknown(shorten(other)), statement.line),

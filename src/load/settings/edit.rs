@@ -5,7 +5,7 @@ use crate::load::error::LoadError;
 use crate::load::report::Sink;
 use crate::load::{LoadOptions, LoadReport, pose};
 use crate::scene::path::{children, find};
-use crate::scene::{Glossy, Hidden, Instance, Light, Material, Transform, Visible};
+use crate::scene::{ByHand, Glossy, Hidden, Instance, Light, Material, Transform, Visible};
 use bevy_ecs::name::Name;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat4, DVec4, Vec3};
@@ -284,15 +284,20 @@ impl Edits {
 fn apply(settings: &Settings, table: &Spanned<EditTable>, sink: &mut Sink<'_>) -> Result<(), LoadError> {
     let edit = table.get_ref();
     let path = edit.entity.join("/");
+    let place = format!("[[edit]] of \"{path}\"");
     match change(sink.world, edit) {
         Ok(Changed::Nothing) if path.is_empty() => {}
         Ok(Changed::Nothing) => {
-            let place = format!("[[edit]] of \"{path}\"");
             sink.ignored(&settings.file, &place, "there is no such thing in the scene");
         }
         Ok(Changed::Old) => {}
         Ok(Changed::New(copies)) => copies.into_iter().for_each(|(_, copy)| sink.note_spawned(copy)),
-        Err(problem) => return Err(settings.broken(table, &format!("[[edit]] of \"{path}\""), problem)),
+        Err(problem) => return Err(settings.broken(table, &place, problem)),
+    }
+    let slot = edit.slot.unwrap_or(0);
+    let instance = find(sink.world, &edit.entity).and_then(|thing| sink.world.get::<Instance>(thing));
+    if edit.material.is_some() && instance.is_none_or(|instance| instance.materials.len() <= slot) {
+        sink.ignored(&settings.file, &place, format!("it has no material in slot {slot}"));
     }
     Ok(())
 }
@@ -344,7 +349,7 @@ pub fn change(world: &mut World, edit: &EditTable) -> Result<Changed, String> {
     };
     let mut place = world.entity_mut(entity);
     if let Some(matrix) = matrix {
-        place.insert(matrix);
+        place.insert((matrix, ByHand));
     }
     match edit.hidden {
         Some(true) => drop(place.insert(Hidden)),

@@ -13,7 +13,7 @@ use super::keymap::Tap;
 use crate::app::FrameStats;
 use crate::load::settings::edit::{EditTable, duplicate};
 use crate::scene::path::{children, path_of};
-use crate::scene::{Hidden, Instance, Light, Playing, SceneBounds};
+use crate::scene::{Hidden, Instance, Light, Playing, Pose, SceneBounds};
 use crate::sync::Redone;
 use crate::trace::Lights;
 use bevy_ecs::prelude::*;
@@ -128,11 +128,11 @@ impl Editor {
         copied
     }
 
-    /// That they are not what the files have: the first has another place, others are copies of what was changed before.
-    fn note_copies(&mut self, copies: &[(Entity, Entity)]) {
+    /// That they are not what the files have: the first has another place, others are copies of what was changed or moved before.
+    fn note_copies(&mut self, world: &World, copies: &[(Entity, Entity)]) {
         let edited: Vec<Entity> = self.edited.iter().map(|&(entity, _)| entity).collect();
         for (n, &(of, copy)) in copies.iter().enumerate() {
-            if n == 0 || edited.contains(&of) {
+            if n == 0 || edited.contains(&of) || world.get::<Pose>(of).is_some() {
                 self.note(Selection { entity: copy, slot: 0 });
             }
         }
@@ -221,7 +221,7 @@ fn select(world: &mut World, editor: &mut Editor, cursor: DVec2) {
 fn select_parent(world: &mut World, editor: &mut Editor) {
     let Some(selection) = selected(world, editor) else { return };
     let Some(parent) = world.get::<ChildOf>(selection.entity).map(ChildOf::parent) else {
-        return say(world, "it moves with nothing else");
+        return say(world, "that is all of it: it moves with nothing else");
     };
     editor.row = 0;
     editor.redone.clear();
@@ -298,7 +298,7 @@ fn copy(world: &mut World, editor: &mut Editor) {
     crate::app::propagate(world);
     editor.redo.clear();
     let copied = editor.made(world, &copies, selection.slot);
-    editor.note_copies(&copies);
+    editor.note_copies(world, &copies);
     editor.selected = Some(copied);
     // Beside the original, not in it.
     let rows = rows(world, copied.entity, 0, radius(world));
@@ -328,8 +328,10 @@ pub fn finish_sync(world: &mut World) {
     }
     let Some(mut editor) = world.remove_resource::<Editor>() else { return };
     editor.written = save::edits(world, &editor).unwrap_or_default().into();
-    if dirty {
+    if dirty || moved {
         show(world, &mut editor);
+    }
+    if dirty {
         let dark = world.resource::<Lights>().is_empty();
         if !std::mem::replace(&mut editor.dark, dark) && dark {
             say(world, "that was the last light: {undo} brings it back");

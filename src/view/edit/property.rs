@@ -1,10 +1,13 @@
 //! Everything about a thing that can be edited, as numbers with names.
 
+use super::below;
+use crate::bvh::Aabb;
 use crate::load::settings::edit::{set_sizes, sizes, spectra};
 use crate::scene::color::luminance;
-use crate::scene::{GlobalTransform, Glossy, Instance, Light, Material, Transform};
+use crate::scene::{ByHand, GlobalTransform, Glossy, Instance, Light, Material, Mesh, Transform};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot, Vec3};
+use std::f32::consts::FRAC_PI_2;
 use std::f64::consts::PI;
 
 /// One number of a thing.
@@ -128,7 +131,7 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
         for (i, size) in sizes(light).into_iter().enumerate() {
             let (label, degrees) = size_label(light, i);
             let value = if degrees { f64::from(size).to_degrees() } else { f64::from(size) };
-            let range = if degrees { [0.0, 180.0] } else { POSITIVE };
+            let range = size_range(light, i, degrees);
             add(Property::Size(i), label, value, if degrees { 1.0 } else { 0.1 }, !degrees, range);
         }
     }
@@ -161,6 +164,16 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
     rows
 }
 
+/// What [`set_sizes`] takes.
+fn size_range(light: &Light, i: usize, degrees: bool) -> [f64; 2] {
+    match light {
+        Light::Spot { outer_angle, .. } if i == 0 => [0.0, f64::from(*outer_angle).to_degrees()],
+        Light::Spot { inner_angle, .. } => [f64::from(*inner_angle).to_degrees(), 90.0],
+        _ if degrees => [0.0, 180.0],
+        _ => POSITIVE,
+    }
+}
+
 fn size_label(light: &Light, i: usize) -> (&'static str, bool) {
     match light {
         Light::Spot { .. } => (["inner angle", "outer angle"][i % 2], true),
@@ -181,7 +194,31 @@ pub fn material_of(world: &World, entity: Entity, slot: usize) -> Option<Entity>
 fn parts(place: &DAffine3) -> (DVec3, DVec3, DVec3) {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
     let (z, y, x) = rotation.to_euler(EulerRot::ZYX);
-    (scale, DVec3::new(x, y, z), translation)
+    // Of the two ways to say it the one with less about x and z: who turns a thing about y goes on beyond a right angle.
+    let other = DVec3::new(x - PI.copysign(x), PI.copysign(y) - y, z - PI.copysign(z));
+    let turn = if x.abs() + z.abs() > PI { other } else { DVec3::new(x, y, z) };
+    (scale, turn, translation)
+}
+
+/// About what a thing is turned and scaled, in its own space: its origin, but where that is outside of all that it shows, as with
+/// files that have all of their objects in one place, the middle of these.
+fn pivot(world: &World, entity: Entity, global: &DAffine3) -> DVec3 {
+    let local = global.inverse();
+    let shown = below(world, entity).into_iter().chain([entity]);
+    let mut bounds = Aabb::EMPTY;
+    for thing in shown {
+        let mesh = world.get::<Instance>(thing).and_then(|instance| world.get::<Mesh>(instance.mesh));
+        let (Some(mesh), Some(place)) = (mesh, world.get::<GlobalTransform>(thing)) else { continue };
+        let own = if thing == entity { DAffine3::IDENTITY } else { local * place.0 };
+        let aabb = Aabb::around(&mesh.0.positions);
+        for corner in 0..if aabb.is_empty() { 0 } else { 8 } {
+            let side = |axis: usize| if corner >> axis & 1 == 0 { aabb.min[axis] } else { aabb.max[axis] };
+            let corner = Vec3::new(side(0), side(1), side(2)).as_dvec3();
+            bounds = bounds.with(own.transform_point3(corner).as_vec3());
+        }
+    }
+    let has_origin = bounds.is_empty() || bounds.contains(&Aabb::around(&[Vec3::ZERO]));
+    if has_origin { DVec3::ZERO } else { bounds.center().as_dvec3() }
 }
 
 /// Azimuth and elevation of a sun, degrees. It shines along its -Z.
@@ -229,6 +266,10 @@ fn place(world: &mut World, entity: Entity, property: Property, value: f64) {
     let Some(global) = world.get::<GlobalTransform>(entity).map(|global| global.0) else { return };
     let (scale, turn, translation) = parts(&global);
     let mut moved = global;
+    let pivot = match property {
+        Property::Turn(_) | Property::Scale => pivot(world, entity, &global),
+        _ => DVec3::ZERO,
+    };
     match property {
         Property::Position(axis) => {
             let mut to = translation;
@@ -246,6 +287,9 @@ fn place(world: &mut World, entity: Entity, property: Property, value: f64) {
         Property::Elevation => moved.matrix3 = turned([stands(&global)[0], value]),
         _ => moved.matrix3 *= value / scale.abs().max_element(),
     }
+    if pivot != DVec3::ZERO {
+        moved.translation = global.transform_point3(pivot) - moved.matrix3 * pivot;
+    }
     let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
     let world_from_parent = parent.and_then(|p| world.get::<GlobalTransform>(p)).map(|g| g.0);
     let local = world_from_parent.map_or(moved, |parent| parent.inverse() * moved);
@@ -253,6 +297,7 @@ fn place(world: &mut World, entity: Entity, property: Property, value: f64) {
         && let Some(mut transform) = world.get_mut::<Transform>(entity)
     {
         transform.set_if_neq(Transform(local));
+        world.entity_mut(entity).insert(ByHand);
     }
     // The next edit of the same frame starts from here.
     crate::app::propagate(world);
@@ -284,6 +329,11 @@ fn set_light(light: &mut Light, property: Property, value: f32) {
             let degrees = size_label(light, i).1;
             if let Some(size) = wanted.get_mut(i) {
                 *size = if degrees { value.to_radians() } else { value };
+                // Degrees and back may round beyond the other angle.
+                if let Light::Spot { inner_angle, outer_angle, .. } = light {
+                    let limits = if i == 0 { [0.0, *outer_angle] } else { [*inner_angle, FRAC_PI_2] };
+                    wanted[i] = wanted[i].clamp(limits[0], limits[1]);
+                }
                 // One that cannot be stays as it is.
                 set_sizes(light, &wanted);
             }

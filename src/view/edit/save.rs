@@ -41,8 +41,16 @@ pub fn tables(world: &World, editor: &Editor) -> Vec<EditTable> {
         let before = past.clone().find(|undo| undo.selection.entity == entity);
         let of_slot = past.find(|undo| undo.selection == Selection { entity, slot });
         let material = super::property::material_of(world, entity, slot);
-        let material = material.and_then(|m| world.get::<Material>(m)).filter(|&material| {
-            of_slot.and_then(|undo| undo.material.as_ref()).is_none_or(|(_, before)| before != material)
+        // A copy wears what the original wears: only who changed that means it.
+        let as_it_was = material.and_then(|m| {
+            let mut known = editor.undo.iter().filter_map(|undo| undo.material.as_ref());
+            known.find(|(of, _)| *of == m).map(|(_, before)| before)
+        });
+        let material = material.and_then(|m| world.get::<Material>(m)).filter(|&material| match is_copy {
+            true => as_it_was.is_some_and(|before| before != material),
+            false => {
+                of_slot.and_then(|undo| undo.material.as_ref()).is_none_or(|(_, before)| before != material)
+            }
         });
         let transform = world.get::<Transform>(entity);
         let transform = transform.filter(|&now| before.and_then(|undo| undo.transform) != Some(*now));

@@ -225,6 +225,76 @@ fn a_thing_is_hidden_with_all_below_it() {
     assert_eq!(hidden(&app), [false; 2]);
 }
 
+/// A copy wears what its original wears; what nobody changed stays as the files say, also what was changed and undone.
+#[test]
+fn only_materials_that_were_changed_are_written() {
+    let mut app = editable("cornell");
+    let material = |app: &App| {
+        let tables = save::tables(&app.world, app.world.resource::<Editor>());
+        tables.iter().filter(|table| table.material.is_some()).count()
+    };
+    choose(&mut app, PLACES[0]);
+    let red = status(&app).rows.iter().position(|row| row.property == Property::BaseColor(0)).unwrap();
+    press(&mut app, Tap::Duplicate, [0.5; 2]);
+    press(&mut app, Tap::More, [0.5; 2]);
+    assert_eq!(material(&app), 0, "{}", app.world.resource::<Editor>().written());
+    (0..red).for_each(|_| press(&mut app, Tap::NextRow, [0.5; 2]));
+    press(&mut app, Tap::Less, [0.5; 2]);
+    assert_eq!(material(&app), 1);
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    assert_eq!(material(&app), 0);
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    // A thing moved, another one coloured, and that undone.
+    let mut app = editable("cornell");
+    choose(&mut app, PLACES[1]);
+    press(&mut app, Tap::More, [0.5; 2]);
+    choose(&mut app, PLACES[0]);
+    (0..red).for_each(|_| press(&mut app, Tap::NextRow, [0.5; 2]));
+    press(&mut app, Tap::Less, [0.5; 2]);
+    assert_eq!(material(&app), 1);
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    assert_eq!((material(&app), app.world.resource::<Editor>().edited.len()), (0, 1));
+}
+
+/// What was moved by hand stands where it was put while an animation plays; undone, it goes where that has it.
+#[test]
+fn animations_leave_alone_what_was_moved_by_hand() {
+    use crate::scene::animation::{Animation, Channel, Curve, Property as Moved};
+    let mut app = editable("cornell");
+    let mut instances = app.world.query_filtered::<Entity, With<Instance>>();
+    let thing = instances.iter(&app.world).next().unwrap();
+    let parts = app.world.get::<Transform>(thing).unwrap().0.to_scale_rotation_translation();
+    let pose = Pose { scale: parts.0, rotation: parts.1, translation: parts.2 };
+    app.world.entity_mut(thing).insert(pose);
+    let curve =
+        Curve { times: vec![0.0, 1.0], values: vec![0., 0., 0., 8., 0., 0.], width: 3, ..Curve::default() };
+    let channels = vec![Channel { target: thing, property: Moved::Translation, curve }];
+    let animation = app.world.spawn(Animation { channels, duration: 1.0 }).id();
+    let play = |app: &mut App, time: f64| {
+        app.world.insert_resource(Playing { animations: vec![animation], time: Some(time) });
+        app.frame();
+        app.world.get::<GlobalTransform>(thing).unwrap().0.translation
+    };
+    let x = |app: &App| status(app).rows[0].value;
+    assert_eq!(play(&mut app, 0.25).x, 2.0);
+    app.world.resource_mut::<Editor>().selected = Some(Selection { entity: thing, slot: 0 });
+    press(&mut app, Tap::More, [0.5; 2]);
+    let put = app.world.get::<GlobalTransform>(thing).unwrap().0.translation;
+    assert_eq!(play(&mut app, 0.5), put);
+    assert_eq!(x(&app), put.x);
+    // A copy is saved with its place, for at another time the file has another.
+    press(&mut app, Tap::Undo, [0.5; 2]);
+    app.frame();
+    assert_eq!(app.world.get::<GlobalTransform>(thing).unwrap().0.translation.x, 4.0);
+    let group = app.world.spawn((Name::new("group"), Transform::default())).id();
+    app.world.entity_mut(thing).insert(ChildOf(group));
+    app.world.resource_mut::<Editor>().selected = Some(Selection { entity: group, slot: 0 });
+    press(&mut app, Tap::Duplicate, [0.5; 2]);
+    let tables = save::tables(&app.world, app.world.resource::<Editor>());
+    assert_eq!(tables.iter().filter(|table| table.matrix.is_some()).count(), 2, "{tables:?}");
+}
+
 /// What belongs together is moved as one, and saved so.
 #[test]
 fn a_group_is_selected_by_what_is_in_it() {
@@ -255,7 +325,7 @@ fn a_group_is_selected_by_what_is_in_it() {
     press(&mut app, Tap::SelectParent, [0.5; 2]);
     assert_eq!(status(&app).name, "group", "nothing is above it");
     let said = app.world.resource::<Notices>().0.last().cloned();
-    assert_eq!(said, Some(Notice::Text("it moves with nothing else".to_owned())));
+    assert_eq!(said, Some(Notice::Text("that is all of it: it moves with nothing else".to_owned())));
 }
 
 /// What moves with a thing is copied with it, changed and hidden as it is; undone, done again, saved.
@@ -283,7 +353,7 @@ fn a_thing_is_copied_with_all_below_it() {
     // ... is the same in the file, which knows it by its name.
     let path = path_of(&app.world, copied_lamp);
     let tables = save::tables(&app.world, app.world.resource::<Editor>());
-    let table = tables.iter().find(|table| table.entity == path).expect("written");
+    let table = tables.iter().find(|table| table.entity == path).unwrap();
     assert!(table.matrix.is_some() && table.light.is_some(), "{table:?}");
     // The copied lamp is changed, and all of it undone and done again.
     app.world.resource_mut::<Editor>().selected = Some(of(copied_lamp));

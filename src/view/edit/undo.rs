@@ -4,7 +4,7 @@ use super::property::{Property, material_of};
 use super::{Editor, Selection, say};
 use crate::load::settings::edit::duplicate;
 use crate::scene::path::path_of;
-use crate::scene::{Hidden, Light, Material, Pose, Transform};
+use crate::scene::{ByHand, Hidden, Light, Material, Playing, Pose, Transform};
 use bevy_ecs::prelude::*;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -30,6 +30,8 @@ pub(super) struct Undo {
     pub(super) light: Option<Light>,
     pub(super) material: Option<(Entity, Material)>,
     pub(super) hidden: bool,
+    /// Whether it stood where somebody had put it.
+    pub(super) by_hand: bool,
     /// It was done together with the one before.
     pub(super) joined: bool,
     /// What a copy is called.
@@ -52,6 +54,7 @@ impl Undo {
             light: world.get::<Light>(entity).cloned(),
             material: material.and_then(|m| Some((m, world.get::<Material>(m)?.clone()))),
             hidden: world.get::<Hidden>(entity).is_some(),
+            by_hand: world.get::<ByHand>(entity).is_some(),
             joined: false,
             name: path_of(world, entity).pop().unwrap_or_default(),
         }
@@ -85,6 +88,14 @@ impl Undo {
             now.set_if_neq(value);
         }
         set_hidden(world, entity, self.hidden);
+        if self.by_hand {
+            world.entity_mut(entity).insert(ByHand);
+        } else if world.entity_mut(entity).take::<ByHand>().is_some()
+            && let Some(mut playing) = world.get_resource_mut::<Playing>()
+        {
+            // It goes where its animation, if it has one, is by now.
+            playing.set_changed();
+        }
     }
 }
 
@@ -143,10 +154,12 @@ pub(super) fn undo(world: &mut World, editor: &mut Editor) {
         }
     }
     crate::app::propagate(world);
-    // With all of it undone, nothing was edited.
-    if editor.undo.is_empty() {
-        editor.edited.clear();
-    }
+    // What was undone altogether is not edited.
+    let Editor { undo, edited, .. } = editor;
+    edited.retain(|&(entity, slot)| {
+        let selection = Selection { entity, slot };
+        undo.iter().any(|undo| undo.selection == selection || undo.copies.contains(&entity))
+    });
 }
 
 /// Does again what was undone last.
@@ -175,7 +188,7 @@ pub(super) fn redo(world: &mut World, editor: &mut Editor) {
 fn copy_again(world: &mut World, editor: &mut Editor, before: &Undo, original: Selection) -> Selection {
     let copies = duplicate(world, original.entity, &before.name);
     let copied = editor.made(world, &copies, before.selection.slot);
-    editor.note_copies(&copies);
+    editor.note_copies(world, &copies);
     let now_called: HashMap<Entity, Entity> =
         before.copies.iter().copied().zip(copies.into_iter().map(|(_, copy)| copy)).collect();
     for later in &mut editor.redo {

@@ -295,6 +295,12 @@ fn edits_are_saved_beside_the_scene_and_told_of_when_it_is_opened_again() {
     // The file itself means the same, but not where its scene is gone.
     let opened = stage.open("lone.edits_2.toml", Wishes::default(), &LoadOptions::default());
     assert_eq!(identity(&opened), identity(&with));
+    let checked = crate::load::Card::check(&saved[1], &LoadOptions::default());
+    assert_ne!(checked.verdict, crate::load::Verdict::Refused, "{}", checked.text());
+    // So does one of a scene that needs no file.
+    let edits = "[[edit]]\nentity = [\"cornell\"]\nhidden = false\n";
+    stage.write("cornell.edits_1.toml", edits);
+    stage.open("cornell.edits_1.toml", Wishes::default(), &LoadOptions::default());
     std::fs::remove_file(stage.0.join("lone.obj")).unwrap();
     let source = SceneSource::File(saved[1].clone());
     let alone = open(&source, &LoadOptions::default(), &Wishes::default()).err().unwrap().to_string();

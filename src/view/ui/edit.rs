@@ -16,6 +16,7 @@ const NAMES: f32 = 74.0;
 const FIELD: f32 = 96.0;
 /// Where it is kept of which thing and number too much or too little was typed last.
 const BEYOND: &str = "beyond its limits";
+type Beyond = ([usize; 2], Property, f64);
 /// Room for the names above the numbers, and for what is told below them.
 const HEAD: f32 = 64.0;
 const FOOT: f32 = 52.0;
@@ -68,7 +69,9 @@ pub fn show(
                 .max_height((height - HEAD - FOOT).max(MARGIN))
                 .scroll_source(source);
             numbers.show(ui, |ui| show_numbers(ui, status, changed));
-            if !status.redone.is_empty() {
+            if let Some(limits) = beyond(ui, status) {
+                ui.label(RichText::new(limits).color(CAUTION).small());
+            } else if !status.redone.is_empty() {
                 ui.label(RichText::new(&status.redone).color(FAINT).small());
             }
         });
@@ -99,26 +102,29 @@ fn show_numbers(ui: &mut Ui, status: &EditStatus, changed: &mut Vec<(Property, f
                 value
             };
             let drag = DragValue::new(&mut value).speed(speed).range(low..=high);
-            let drag = drag.max_decimals(decimals(speed)).custom_parser(parse);
+            // Not while it is typed: 0.5 begins with 0, and 5000 is in the way of nobody who wants 50.
+            let drag = drag.max_decimals(decimals(speed)).custom_parser(parse).update_while_editing(false);
             let is_changed = ui.add_sized([FIELD, ui.spacing().interact_size.y], drag).changed();
             if is_changed {
                 changed.push((row.property, value));
             }
             ui.end_row();
-            let (beyond, here) = (Id::new(BEYOND), (status.place, i));
-            if is_changed || typed.get().is_some() {
-                let is_beyond = typed.get().is_some_and(|typed| !(low..=high).contains(&typed));
-                ui.data_mut(|data| data.insert_temp(beyond, is_beyond.then_some(here)));
-            }
-            if ui.data(|data| data.get_temp(beyond)) == Some(Some(here)) {
-                // The nearest that it can be is taken.
-                let limits = [low, high].map(short);
-                ui.label("");
-                ui.label(RichText::new(format!("{} to {}", limits[0], limits[1])).color(CAUTION).small());
-                ui.end_row();
+            if let Some(typed) = typed.get() {
+                let is_beyond = !(low..=high).contains(&typed);
+                let taken = is_beyond.then_some((status.place, row.property, typed.clamp(low, high)));
+                ui.data_mut(|data| data.insert_temp(Id::new(BEYOND), taken));
             }
         }
     });
+}
+
+/// What a number may be beyond whose limits one was typed, as long as it is the nearest that it can be.
+fn beyond(ui: &Ui, status: &EditStatus) -> Option<String> {
+    let taken = ui.data(|data| data.get_temp::<Option<Beyond>>(Id::new(BEYOND)))?;
+    let (_, property, value) = taken.filter(|(place, ..)| *place == status.place)?;
+    let row = status.rows.iter().find(|row| row.property == property)?;
+    let is_there = (row.value - value).abs() <= 1e-3 * value.abs().max(1e-3);
+    is_there.then(|| format!("{}: {} to {}", row.label, short(row.range[0]), short(row.range[1])))
 }
 
 /// As people type them: with a decimal comma, any minus, blanks.

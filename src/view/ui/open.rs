@@ -23,6 +23,8 @@ pub struct Prompt {
     names: Vec<String>,
     /// Which of these the arrows went to.
     chosen: Option<usize>,
+    /// All of it is selected: the next letter takes its place.
+    selected: bool,
     /// Why the last key came to nothing.
     said: String,
 }
@@ -69,6 +71,12 @@ impl Prompt {
             KeyCode::Enter | KeyCode::NumpadEnter | KeyCode::Tab | KeyCode::ArrowRight => self.take_chosen(),
             _ => {}
         }
+        if std::mem::take(&mut self.selected) {
+            let types = text.is_some_and(|text| !text.chars().all(char::is_control));
+            if matches!(code, KeyCode::Backspace | KeyCode::Delete) || types {
+                self.remove(0, self.text.len());
+            }
+        }
         match code {
             KeyCode::Escape => return Typed::Nothing,
             KeyCode::Enter | KeyCode::NumpadEnter if self.text.is_empty() => return Typed::Nothing,
@@ -89,7 +97,7 @@ impl Prompt {
             KeyCode::ArrowLeft => self.cursor = self.before(),
             KeyCode::ArrowRight => self.cursor = self.after(),
             KeyCode::Home => self.cursor = 0,
-            KeyCode::KeyA if control => self.cursor = 0,
+            KeyCode::KeyA if control => (self.selected, self.cursor) = (true, self.text.len()),
             KeyCode::End => self.cursor = self.text.len(),
             KeyCode::KeyE if control => self.cursor = self.text.len(),
             _ => self.insert(text.unwrap_or("")),
@@ -234,7 +242,8 @@ pub fn show(context: &Context, prompt: &Prompt) {
         );
         let (before, after) = prompt.text.split_at(prompt.cursor);
         let line = if after.is_empty() { format!("{before}_") } else { format!("{before}|{after}") };
-        ui.label(RichText::new(legible(context, &line)).font(FontId::monospace(14.0)).color(ACCENT));
+        let line = RichText::new(legible(context, &line)).font(FontId::monospace(14.0)).color(ACCENT);
+        ui.label(if prompt.selected { line.background_color(FAINT.gamma_multiply(0.4)) } else { line });
         if !prompt.said.is_empty() {
             ui.label(RichText::new(legible(context, &prompt.said)).color(CAUTION));
         }
@@ -344,6 +353,10 @@ mod tests {
         assert_eq!(typed("a/äb", &[(left, None, false), (back, None, false)]), "a/b");
         assert_eq!(typed("ab", &[(KeyCode::Home, None, false), (KeyCode::Delete, None, false)]), "b");
         assert_eq!(typed("ab", &[(left, None, false), paste("c"), paste("d")]), "acdb");
+        let all = (KeyCode::KeyA, None, true);
+        assert_eq!(typed("a/b.glb", &[all, paste("/c.glb")]), "/c.glb");
+        assert_eq!(typed("a/b.glb", &[all, (back, None, false)]), "");
+        assert_eq!(typed("ab", &[all, (left, None, false), paste("c")]), "acb", "no longer");
         assert_eq!(typed("", &[(back, None, true), (back, None, false), (KeyCode::Delete, None, false)]), "");
     }
 

@@ -173,6 +173,8 @@ fn what_is_left_out_is_said() {
     let below = gltf_triangle("", "", "")
         .replace(r#""nodes":[{"mesh":0}],"#, r#""nodes":[{"children":[1],"scale":[1,0,1]},{"mesh":0}],"#);
     assert_says(&warnings(&below), "node 1: scaled to nothing");
+    // Flat, but as much to be seen as ever.
+    assert_eq!(warnings(&gltf_triangle(r#","scale":[2,1,0]"#, "", "")), "");
     let bare = textured(&format!("data:image/png;base64,{}", base64(&png([9; 4]))))
         .replace(r#","TEXCOORD_0":1"#, "");
     assert_says(&warnings(&bare), "no TEXCOORD_0");

@@ -38,6 +38,63 @@ fn world() -> (World, Vec<Entity>) {
 }
 
 #[test]
+fn a_turn_goes_on_beyond_a_right_angle() {
+    let (mut world, all) = world();
+    let shown = |world: &World| {
+        let rows = rows(world, all[0], 0, 1.0);
+        [0, 1, 2].map(|axis| rows.iter().find(|row| row.property == Property::Turn(axis)).unwrap().value)
+    };
+    for (axis, value) in
+        [(0, 0.0), (1, 0.0), (2, 0.0), (1, 85.0), (1, 95.0), (1, 120.0), (1, -170.0), (0, 30.0)]
+    {
+        set(&mut world, all[0], 0, Property::Turn(axis), value);
+        assert!((shown(&world)[axis] - value).abs() < 1e-6, "{value} about {axis}: {:?}", shown(&world));
+    }
+    assert!((shown(&world)[1] + 170.0).abs() < 1e-6, "{:?}", shown(&world));
+}
+
+#[test]
+fn angles_of_a_spot_are_limited_by_each_other() {
+    let (mut world, all) = world();
+    let spot = all[3];
+    for (size, value, expected) in [(0, 50.0, 28.65), (1, 100.0, 90.0), (0, 30.0, 30.0), (1, 10.0, 30.0)] {
+        let before = rows(&world, spot, 0, 1.0);
+        let row = before.iter().find(|row| row.property == Property::Size(size)).unwrap();
+        set(&mut world, spot, 0, row.property, f64::clamp(value, row.range[0], row.range[1]));
+        let after = rows(&world, spot, 0, 1.0);
+        let row = after.iter().find(|row| row.property == Property::Size(size)).unwrap();
+        assert!((row.value - expected).abs() < 0.01, "{value}: {}", row.value);
+    }
+}
+
+/// Objects of one file have their origin where the file has its own.
+#[test]
+fn what_is_far_from_its_origin_turns_about_its_middle() {
+    let triangles = |low: f32| crate::scene::TriangleMesh {
+        positions: vec![Vec3::splat(low), Vec3::splat(low) + Vec3::X, Vec3::splat(low + 2.0)],
+        ..crate::scene::TriangleMesh::default()
+    };
+    for (low, stays) in [(10.0, DVec3::splat(11.0)), (-1.0, DVec3::ZERO)] {
+        let mut world = World::new();
+        let mesh = world.spawn(Mesh(std::sync::Arc::new(triangles(low)))).id();
+        let instance = Instance { mesh, materials: Vec::new() };
+        let group = world.spawn(Transform::default()).id();
+        let thing = world.spawn((instance, ChildOf(group))).id();
+        crate::app::propagate(&mut world);
+        for entity in [thing, group] {
+            for (property, value) in
+                [(Property::Turn(1), 45.0), (Property::Scale, 3.0), (Property::Turn(0), 120.0)]
+            {
+                let before = world.get::<GlobalTransform>(thing).unwrap().0.transform_point3(stays);
+                set(&mut world, entity, 0, property, value);
+                let after = world.get::<GlobalTransform>(thing).unwrap().0.transform_point3(stays);
+                assert!((after - before).length() < 1e-5, "{property:?}: {before} {after}");
+            }
+        }
+    }
+}
+
+#[test]
 fn what_is_set_is_what_it_is_then_and_nothing_else_changes() {
     let (mut world, all) = world();
     for entity in all {
