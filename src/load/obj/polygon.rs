@@ -84,10 +84,11 @@ fn clip_ears(points: &[DVec2]) -> (Vec<[usize; 3]>, bool) {
             left -= 1;
             tried = 0;
             accept_flat = false;
-            hollows.is_one[here] = false;
+            hollows.forget(here);
             for corner in [a, c] {
-                let (before, after) = (points[previous[corner]], points[next[corner]]);
-                hollows.is_one[corner] &= turn(before, points[corner], after) <= 0.0;
+                if turn(points[previous[corner]], points[corner], points[next[corner]]) > 0.0 {
+                    hollows.forget(corner);
+                }
             }
             here = c;
         } else {
@@ -105,6 +106,9 @@ struct Hollows<'a> {
     points: &'a [DVec2],
     /// By corner. None becomes one while ears are cut off, but some no longer are.
     is_one: Vec<bool>,
+    /// How many there are, and how many there were when the grid was made.
+    left: usize,
+    known: usize,
     low: DVec2,
     /// Of a cell.
     size: DVec2,
@@ -123,18 +127,35 @@ impl<'a> Hollows<'a> {
             turn(before, here, after) <= 0.0
         };
         let is_one: Vec<bool> = (0..n).map(is_hollow).collect();
+        let left = is_one.iter().filter(|&&is_one| is_one).count();
+        let (low, size, cells) = (DVec2::ZERO, DVec2::ONE, Vec::new());
+        let mut hollows = Self { points, is_one, left, known: left, low, size, across: 1, cells, tests: 0 };
+        hollows.sort();
+        hollows
+    }
+
+    /// It is none any more.
+    fn forget(&mut self, corner: usize) {
+        self.left -= usize::from(std::mem::take(&mut self.is_one[corner]));
+        // Ears grow: they shall not cover ever more cells with ever less in them.
+        if self.left < self.known / 4 {
+            self.sort();
+        }
+    }
+
+    /// Makes the grid, of about as many cells as there are to be in it.
+    fn sort(&mut self) {
+        let points = self.points;
         let low = points.iter().fold(DVec2::INFINITY, |low, point| low.min(*point));
         let high = points.iter().fold(DVec2::NEG_INFINITY, |high, point| high.max(*point));
-        let count = is_one.iter().filter(|&&is_one| is_one).count();
-        let across = ((count as f64).sqrt() as usize).clamp(1, 1024);
-        let size = (high - low) / across as f64;
-        let mut hollows =
-            Self { points, is_one, low, size, across, cells: vec![Vec::new(); across * across], tests: 0 };
-        for corner in (0..n).filter(|&corner| hollows.is_one[corner]) {
-            let [x, y] = hollows.cell(points[corner]);
-            hollows.cells[y * across + x].push(corner as u32);
+        self.known = self.left;
+        self.across = ((self.left as f64).sqrt() as usize).clamp(1, 1024);
+        (self.low, self.size) = (low, (high - low) / self.across as f64);
+        self.cells = vec![Vec::new(); self.across * self.across];
+        for corner in (0..points.len()).filter(|&corner| self.is_one[corner]) {
+            let [x, y] = self.cell(points[corner]);
+            self.cells[y * self.across + x].push(corner as u32);
         }
-        hollows
     }
 
     fn cell(&self, point: DVec2) -> [usize; 2] {

@@ -38,7 +38,10 @@ impl Ui {
     }
 
     /// The keyboard is the picture's again; a number that is being typed counts as it is.
-    fn let_go(&self) {
+    fn let_go(&mut self) {
+        if self.takes_text() {
+            return self.key(KeyCode::Enter, None, false);
+        }
         self.context.memory_mut(|memory| {
             if let Some(id) = memory.focused() {
                 memory.surrender_focus(id);
