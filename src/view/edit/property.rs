@@ -168,7 +168,8 @@ pub fn rows(world: &World, entity: Entity, slot: usize, radius: f64) -> Vec<Row>
 fn size_range(light: &Light, i: usize, degrees: bool) -> [f64; 2] {
     match light {
         Light::Spot { outer_angle, .. } if i == 0 => [0.0, f64::from(*outer_angle).to_degrees()],
-        Light::Spot { inner_angle, .. } => [f64::from(*inner_angle).to_degrees(), 90.0],
+        // A right angle in single precision is more than one.
+        Light::Spot { inner_angle, .. } => [f64::from(*inner_angle).to_degrees().min(90.0), 90.0],
         _ if degrees => [0.0, 180.0],
         _ => POSITIVE,
     }
@@ -332,7 +333,7 @@ fn set_light(light: &mut Light, property: Property, value: f32) {
                 // Degrees and back may round beyond the other angle.
                 if let Light::Spot { inner_angle, outer_angle, .. } = light {
                     let limits = if i == 0 { [0.0, *outer_angle] } else { [*inner_angle, FRAC_PI_2] };
-                    wanted[i] = wanted[i].clamp(limits[0], limits[1]);
+                    wanted[i] = wanted[i].max(limits[0]).min(limits[1]);
                 }
                 // One that cannot be stays as it is.
                 set_sizes(light, &wanted);

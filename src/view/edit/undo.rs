@@ -88,9 +88,10 @@ impl Undo {
             now.set_if_neq(value);
         }
         set_hidden(world, entity, self.hidden);
+        let Ok(mut place) = world.get_entity_mut(entity) else { return };
         if self.by_hand {
-            world.entity_mut(entity).insert(ByHand);
-        } else if world.entity_mut(entity).take::<ByHand>().is_some()
+            place.insert(ByHand);
+        } else if place.take::<ByHand>().is_some()
             && let Some(mut playing) = world.get_resource_mut::<Playing>()
         {
             // It goes where its animation, if it has one, is by now.

@@ -65,6 +65,14 @@ fn angles_of_a_spot_are_limited_by_each_other() {
         let row = after.iter().find(|row| row.property == Property::Size(size)).unwrap();
         assert!((row.value - expected).abs() < 0.01, "{value}: {}", row.value);
     }
+    for size in [1, 0] {
+        let right = FRAC_PI_2;
+        let light = Light::Spot { intensity: Vec3::ONE, inner_angle: right, outer_angle: right };
+        world.entity_mut(spot).insert(light);
+        for row in rows(&world, spot, 0, 1.0).iter().filter(|row| row.property == Property::Size(size)) {
+            assert!((row.stepped(1.0) - 90.0).abs() < 1e-4 && row.stepped(-1.0) <= 90.0, "{row:?}");
+        }
+    }
 }
 
 /// Objects of one file have their origin where the file has its own.
