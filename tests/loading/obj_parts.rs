@@ -141,16 +141,33 @@ fn things_that_lie_through_one_another_are_one() {
     assert_eq!(only_mesh(&mut world).slots, [0, 1].repeat(50));
     assert_says(
         &report.decisions().join("\n"),
-        "its objects or groups lie through one another: they are one thing",
+        "its objects or groups lie through one another, or have too many materials: they are one thing",
     );
 }
 
-/// Two objects of so many materials take no longer than one.
+/// As many materials as a mesh has slots, in one object or in two, and more together than that.
 #[test]
-fn materials_without_end_are_no_slower_in_parts() {
-    let faces: String = (0..40_000).map(|n| format!("usemtl m{}\nf 1 2 3\n", n % 20_000)).collect();
-    let (mut world, report) = loaded("a.obj", &format!("{QUAD}o a\n{faces}o b\n{faces}"));
-    assert_eq!((parts(&mut world).len(), report.triangles), (2, 80_000));
+fn materials_without_end_are_worn_by_their_own_parts() {
+    let faces = |count: usize| -> String { (0..count).map(|n| format!("usemtl m{n}\nf 1 2 3\n")).collect() };
+    for (text, things, worn) in [
+        (format!("{QUAD}{}", faces(65_536)), 1, 65_536),
+        (format!("{QUAD}o a\n{0}o b\n{0}", faces(20_000)), 2, 20_000),
+        (format!("{QUAD}o a\n{0}o b\n{0}", faces(40_000)), 1, 40_000),
+    ] {
+        let mtl: String = (0..worn).map(|n| format!("newmtl m{n}\n")).collect();
+        let text = format!("mtllib a.mtl\n{text}");
+        let (mut world, report) = loaded_all(&[("a.obj", text.as_bytes()), ("a.mtl", mtl.as_bytes())]);
+        assert_eq!(report.warnings(), [""; 0]);
+        assert_eq!(world.query::<&Instance>().iter(&world).count(), things);
+        for instance in world.query::<&Instance>().iter(&world) {
+            let mesh = &world.get::<Mesh>(instance.mesh).unwrap().0;
+            assert_eq!((instance.materials.len(), mesh.triangles.len() % worn), (worn, 0));
+            // Each triangle wears what its face says.
+            assert!((0..mesh.triangles.len()).all(|triangle| mesh.slot(triangle) == triangle % worn));
+        }
+        let said = report.decisions().join("\n").contains("too many materials: they are one thing");
+        assert_eq!(said, worn == 40_000);
+    }
 }
 
 /// Far from zero all parts are counted from one place.

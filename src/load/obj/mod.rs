@@ -6,7 +6,8 @@
 //! of two numbers, and one bad statement would lose the whole library).
 //!
 //! Rules where the format leaves a choice: each object (`o`) or, where no two have faces, each group (`g`) is a [`Mesh`] and
-//! an [`Instance`] of its own, unless they are very many ([`parts`]); `usemtl` may change with every face; polygons are cut into `n - 2` triangles in their own plane;
+//! an [`Instance`] of its own, unless they are very many or lie through one another ([`parts`]); `usemtl` may change with every
+//! face; polygons are cut into `n - 2` triangles in their own plane;
 //! without normals a face is flat unless a smoothing group (`s`) says otherwise; texture
 //! coordinates are turned from bottom-left to top-left; a face with a vertex spelled `nan` or `inf`
 //! is refused with its line, one with a number too large is dropped with a warning; points, lines and free-form
@@ -111,11 +112,11 @@ fn spawn_things(file: &str, raw: &Raw, materials: &[Entity], holder: Entity, sin
     tangents::complete_for(&mut done.mesh, &worn, file, "", sink);
     done.mended.tell(file, "", sink);
     sink.report.triangles += done.triangles;
-    let lies_apart = parts::overlap(&done.mesh, &kinds.kinds) <= parts::MOST_OVERLAP;
-    if let Some(what) = parts::told(&raw.objects, &raw.groups, names.len(), lies_apart) {
+    let is_parted = kinds.parts() > 1 && kinds.overlap(&done.mesh) <= parts::MOST_OVERLAP;
+    if let Some(what) = parts::told(&raw.objects, &raw.groups, names.len(), is_parted) {
         sink.decide(file, what);
     }
-    let things = if names.len() > 1 && lies_apart {
+    let things = if is_parted {
         parts::split(&done.mesh, &kinds.kinds, names.len())
             .into_iter()
             .zip(names.into_iter().map(Some))

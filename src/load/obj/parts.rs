@@ -12,7 +12,7 @@ use std::collections::{HashMap, HashSet};
 /// With more named things than this a file is one thing.
 pub(super) const MOST_PARTS: usize = 512;
 /// So often the boxes of the parts may cover that of the whole. With 16 to 500 that each fill it rays took 2.3 to 22 times as long.
-pub(super) const MOST_OVERLAP: f32 = 4.0;
+pub(super) const MOST_OVERLAP: f64 = 4.0;
 /// Letters of a name.
 const MOST_LETTERS: usize = 200;
 /// Stretches of faces under one name: many names may take turns.
@@ -88,13 +88,14 @@ pub(super) fn of_faces(objects: &Names, groups: &Names, faces: usize) -> (Vec<u3
     objects.parts(faces).or_else(|| groups.parts(faces)).unwrap_or_default()
 }
 
-/// What is to be said of a file of `parts` whose names are not all things of their own.
-pub(super) fn told(objects: &Names, groups: &Names, parts: usize, lie_apart: bool) -> Option<String> {
-    let is_parted = parts > 1 && lie_apart;
+/// What is to be said of a file with so many `named` parts that are not all things of their own, or no things at all.
+pub(super) fn told(objects: &Names, groups: &Names, named: usize, is_parted: bool) -> Option<String> {
     let why = match (objects.is_crowded(), groups.is_crowded()) {
         (true, _) => format!("more than {MOST_PARTS} objects (`o`)"),
-        (false, true) if parts < 2 => format!("more than {MOST_PARTS} groups (`g`)"),
-        _ if parts > 1 && !lie_apart => "its objects or groups lie through one another".to_owned(),
+        (false, true) if named < 2 => format!("more than {MOST_PARTS} groups (`g`)"),
+        _ if named > 1 && !is_parted => {
+            "its objects or groups lie through one another, or have too many materials".to_owned()
+        }
         _ => return None,
     };
     let instead = if is_parted { "its groups (`g`) are things instead" } else { "they are one thing" };
@@ -135,31 +136,35 @@ impl Kinds {
         Some(Self { of_faces, kinds })
     }
 
+    /// How many parts they are of.
+    pub(super) fn parts(&self) -> usize {
+        self.kinds.iter().map(|&(part, _)| part as usize + 1).max().unwrap_or(0)
+    }
+
     /// The whole mesh with materials as slots; and all of these.
     pub(super) fn as_materials(&self, mut mesh: TriangleMesh) -> (TriangleMesh, Vec<u16>) {
-        let count = self.kinds.iter().map(|&(_, material)| material + 1).max().unwrap_or(0);
-        if count < 2 {
+        let last = self.kinds.iter().map(|&(_, material)| material).max().unwrap_or(0);
+        if last == 0 {
             mesh.slots = Vec::new();
         }
         for slot in &mut mesh.slots {
             *slot = self.kinds[usize::from(*slot)].1;
         }
-        (mesh, (0..count).collect())
+        (mesh, (0..=last).collect())
     }
-}
 
-/// How often boxes of the parts cover that of the whole, by their areas: so many hierarchies a ray has to enter.
-pub(super) fn overlap(mesh: &TriangleMesh, kinds: &[(u32, u16)]) -> f32 {
-    let parts = kinds.iter().map(|&(part, _)| part as usize + 1).max().unwrap_or(0);
-    let mut boxes = vec![Aabb::EMPTY; parts];
-    for triangle in 0..mesh.triangles.len() {
-        let own = &mut boxes[kinds[mesh.slot(triangle)].0 as usize];
-        *own = mesh.corners(triangle).into_iter().fold(*own, Aabb::with);
+    /// How often boxes of the parts cover that of the whole, by their areas: so many hierarchies a ray has to enter. `mesh` has
+    /// these kinds as slots.
+    pub(super) fn overlap(&self, mesh: &TriangleMesh) -> f64 {
+        let mut boxes = vec![Aabb::EMPTY; self.parts()];
+        for triangle in 0..mesh.triangles.len() {
+            let own = &mut boxes[self.kinds[mesh.slot(triangle)].0 as usize];
+            *own = mesh.corners(triangle).into_iter().fold(*own, Aabb::with);
+        }
+        let whole = boxes.iter().fold(Aabb::EMPTY, |whole, own| whole.union(*own));
+        let area = |aabb: &Aabb| if aabb.is_empty() { 0.0 } else { f64::from(aabb.half_area()) };
+        boxes.iter().map(area).sum::<f64>() / area(&whole).max(f64::MIN_POSITIVE)
     }
-    let whole = boxes.iter().fold(Aabb::EMPTY, |whole, own| whole.union(*own));
-    let area = |aabb: &Aabb| if aabb.is_empty() { 0.0 } else { f64::from(aabb.half_area()) };
-    let all: f64 = boxes.iter().map(area).sum();
-    (all / area(&whole).max(f64::MIN_POSITIVE)) as f32
 }
 
 /// The parts of `mesh`, whose slots are `kinds`; and of each which materials its slots are.

@@ -328,7 +328,7 @@ pub fn finish_sync(world: &mut World) {
     }
     let Some(mut editor) = world.remove_resource::<Editor>() else { return };
     editor.written = save::edits(world, &editor).unwrap_or_default().into();
-    if dirty || moved {
+    if dirty || editor.selected.is_some() {
         show(world, &mut editor);
     }
     if dirty {
