@@ -6,7 +6,7 @@ use crate::first_look;
 use crate::image::{Display, ToneMap};
 use crate::load::{
     Card, Kind, LoadError, LoadOptions, LoadReport, SceneSource, SidecarFilter, SidecarIntegrator, choices,
-    edited_scene, load_unedited,
+    edited_scene, harmless, load_unedited,
 };
 use crate::scene::{
     ActiveCamera, Aspect, Camera, Filter, GlobalTransform, Lens, Projection, SceneBounds, Transform,
@@ -196,7 +196,11 @@ pub fn open(source: &SceneSource, options: &LoadOptions, wishes: &Wishes) -> Res
     }
     let build_seconds = start.elapsed().as_secs_f64();
     let card = Card::of(&source.to_string(), &report).text();
-    app.world.insert_resource(LoadCard { text: card.into(), warnings: report.warnings().len() });
+    app.world.insert_resource(LoadCard {
+        text: card.into(),
+        warnings: report.warnings().len(),
+        outdated: None,
+    });
     Ok(Opened { app, report, load_seconds, build_seconds, samples })
 }
 
@@ -236,6 +240,24 @@ pub struct LoadCard {
     pub text: Arc<str>,
     /// Lines about what is not as the files say.
     pub warnings: usize,
+    /// The same, with why the scene could not be loaded again since.
+    pub outdated: Option<Arc<str>>,
+}
+
+impl LoadCard {
+    /// The files are not any more what it speaks of, and could not be loaded.
+    pub fn outdate(&mut self, why: &str) {
+        let (title, rest) = self.text.split_once('\n').unwrap_or((&self.text, ""));
+        let scene = title.rsplit_once(": ").map_or(title, |(scene, _)| scene);
+        self.outdated =
+            Some(format!("{scene}: still the old scene\n  error         {}\n{rest}", harmless(why)).into());
+    }
+
+    /// What holds now.
+    #[must_use]
+    pub fn now(&self) -> &Arc<str> {
+        self.outdated.as_ref().unwrap_or(&self.text)
+    }
 }
 
 /// Where the scene in a world comes from, to load or to speak of it again.

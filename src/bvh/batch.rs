@@ -22,13 +22,14 @@ pub(super) trait Target: Sync {
     /// Where all begins.
     fn nodes(&self) -> &[WideNode];
     /// The triangles, if there is one level only.
-    fn only(&self) -> Option<(&Blas, u32)>;
+    fn only(&self) -> Option<Inside<'_>>;
     /// A ray made ready for the top level.
     fn probe(&self, ray: &Ray) -> Probe;
     /// Around everything, and how much farther boxes reach than their borders.
     fn bounds(&self) -> (Aabb, f32);
-    /// The instance of a top-level leaf, and the ray made ready for it if that is another one.
-    fn enter(&self, entry: usize, ray: &Ray) -> (&Blas, u32, Option<Probe>);
+    /// The instance of a top-level leaf, which of its nodes or leaves is entered (packed), and the ray made ready for it if that
+    /// is another one.
+    fn enter(&self, leaf: usize, ray: &Ray) -> (Inside<'_>, u32, Option<Probe>);
     /// Takes rays of a packet through everything; returns those that are done.
     fn traverse_packet<S: Simd, F: Filter, const ANY: bool>(
         &self,
@@ -37,6 +38,15 @@ pub(super) trait Target: Sync {
         rays: u64,
         filter: F,
     ) -> u64;
+}
+
+/// Whose nodes a ray is among.
+#[derive(Clone, Copy)]
+pub(super) struct Inside<'a> {
+    pub blas: &'a Blas,
+    pub instance: u32,
+    /// Whether the ray is another one there.
+    pub moved: bool,
 }
 
 /// Buffers of a batch, some 30 kB.

@@ -1,6 +1,6 @@
 //! Bottom level: the triangles of one mesh.
 
-use super::batch::{Batch, Scratch, Target, Triangles};
+use super::batch::{Batch, Inside, Scratch, Target, Triangles};
 use super::build::{build_triangles, has_surface};
 use super::filter::{All, Filter};
 use super::leaves::Leaves;
@@ -135,8 +135,8 @@ impl Target for Blas {
     }
 
     #[inline(always)]
-    fn only(&self) -> Option<(&Blas, u32)> {
-        Some((self, 0))
+    fn only(&self) -> Option<Inside<'_>> {
+        Some(Inside { blas: self, instance: 0, moved: false })
     }
 
     #[inline(always)]
@@ -150,8 +150,8 @@ impl Target for Blas {
     }
 
     #[inline(always)]
-    fn enter(&self, _: usize, _: &Ray) -> (&Blas, u32, Option<Probe>) {
-        (self, 0, None)
+    fn enter(&self, _: usize, _: &Ray) -> (Inside<'_>, u32, Option<Probe>) {
+        (Inside { blas: self, instance: 0, moved: false }, 0, None)
     }
 
     #[inline(always)]
@@ -164,6 +164,6 @@ impl Target for Blas {
     ) -> u64 {
         let Scratch { packet, found, waiting, numbers, .. } = scratch;
         let mut visitor = Triangles::<F, ANY> { blas: self, instance: 0, found, numbers, filter };
-        self.wide.traverse_packet::<S, ANY>(simd, packet, rays, waiting, &mut visitor)
+        self.wide.traverse_packet::<S, ANY>(simd, packet, 0, rays, waiting, &mut visitor)
     }
 }

@@ -170,12 +170,22 @@ impl Tlas {
                     walk.open(node, &probe, instance, &mut waiting);
                 }
                 (Child::Leaf { first, .. }, None) => {
-                    let instance = hierarchy.prims[first];
+                    let inner = self.entries()[hierarchy.prims[first] as usize];
+                    let instance = inner.instance;
                     see(&walk.step(Visited::Instance, bounds, None, near));
                     let probe = self.local_probe(instance, ray, &world);
                     local = Some((instance, probe));
-                    if let Some(root) = nodes(instance).hierarchy().nodes.first() {
-                        walk.open(root, &probe, Some(instance), &mut waiting);
+                    match inner.child() {
+                        Child::Node(root) => {
+                            let root = &nodes(instance).hierarchy().nodes[root];
+                            walk.open(root, &probe, Some(instance), &mut waiting);
+                        }
+                        Child::Leaf { first, count } => {
+                            walk.test(nodes(instance), &probe, (first, count), instance);
+                            if any && walk.best.is_some() {
+                                break;
+                            }
+                        }
                     }
                 }
                 (Child::Leaf { first, count }, Some(instance)) => {

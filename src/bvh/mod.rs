@@ -7,6 +7,7 @@
 pub mod aabb;
 mod batch;
 pub mod blas;
+mod braid;
 pub mod build;
 mod filter;
 mod found;
@@ -30,6 +31,7 @@ pub mod wide;
 
 pub use aabb::Aabb;
 pub use blas::Blas;
+pub use braid::Entry;
 pub use build::{Bvh, Defect, MOST_TRIANGLES, Node};
 pub use filter::Accept;
 pub use probe::Probe;

@@ -140,15 +140,16 @@ impl Tlas {
     #[must_use]
     pub fn blockers(&self, shaft: &Shaft, mut report: impl FnMut(u32, [Vec3; 3]) -> bool) -> bool {
         let mut patience = PATIENCE;
-        search(self.hierarchy(), shaft, &mut patience, |(entry, _), patience| {
-            let instance = self.hierarchy().prims[entry];
+        search(self.hierarchy(), Child::Node(0), shaft, &mut patience, |(leaf, _), patience| {
+            let entry = self.entries()[self.hierarchy().prims[leaf] as usize];
+            let instance = entry.instance;
             let placement = &self.placements()[instance as usize];
             let blas = placement.blas();
             if placement.is_identity() {
-                return blas.blockers(shaft, patience, |triangle| report(instance, triangle));
+                return blas.blockers(entry.child(), shaft, patience, |triangle| report(instance, triangle));
             }
             let local = shaft.moved(placement.local_from_world(), placement.world_from_local());
-            blas.blockers(&local, patience, |triangle| {
+            blas.blockers(entry.child(), &local, patience, |triangle| {
                 let placed = |p: Vec3| placement.world_from_local().transform_point3(p.as_dvec3()).as_vec3();
                 report(instance, triangle.map(placed))
             })
@@ -159,12 +160,13 @@ impl Tlas {
 impl Blas {
     fn blockers(
         &self,
+        root: Child,
         shaft: &Shaft,
         patience: &mut usize,
         mut report: impl FnMut([Vec3; 3]) -> bool,
     ) -> bool {
         shaft.misses_box(&self.bounds())
-            || search(&self.wide, shaft, patience, |leaf, _| {
+            || search(&self.wide, root, shaft, patience, |leaf, _| {
                 self.leaves
                     .numbered(leaf)
                     .all(|(_, triangle)| shaft.misses_triangle(&triangle) || report(triangle))
@@ -172,16 +174,21 @@ impl Blas {
     }
 }
 
-/// Calls `visit` with all leaves, first entry and number of entries, that are not outside, until it says false.
+/// Calls `visit` with all leaves below `root`, first entry and number of entries, that are not outside, until it says false.
 fn search(
     wide: &WideBvh,
+    root: Child,
     shaft: &Shaft,
     patience: &mut usize,
     mut visit: impl FnMut((usize, usize), &mut usize) -> bool,
 ) -> bool {
+    if wide.nodes.is_empty() {
+        return true;
+    }
     let mut waiting = Vec::with_capacity(64);
-    if !wide.nodes.is_empty() {
-        waiting.push(0);
+    match root {
+        Child::Node(root) => waiting.push(root),
+        Child::Leaf { first, count } => return visit((first, count), patience),
     }
     while let Some(index) = waiting.pop() {
         if *patience == 0 {

@@ -31,6 +31,12 @@ impl Waiting {
     pub fn get(&self, i: usize) -> (f32, u32) {
         (self.nears[i], self.children[i])
     }
+
+    /// Has a child wait that is entered in any case.
+    #[inline(always)]
+    pub fn put(&mut self, i: usize, child: u32) {
+        (self.nears[i], self.children[i]) = (0.0, child);
+    }
 }
 
 impl WideBvh {

@@ -1,6 +1,7 @@
 //! Top level: placed instances of bottom levels.
 
-use super::batch::{Batch, Scratch, Target, Triangles};
+use super::batch::{Batch, Inside, Scratch, Target, Triangles};
+use super::braid::{Entry, entries};
 use super::filter::{Accept, All, Filter, Only};
 use super::found::Found;
 use super::packet::Packet;
@@ -8,9 +9,9 @@ use super::rows::{PACKET, Rays, each, lowest};
 use super::simd::{Isa, Simd};
 use super::single::Waiting;
 use super::together::Visitor;
-use super::wide::{WideBvh, WideNode};
+use super::wide::{Child, WideBvh, WideNode};
 use super::{Aabb, Blas, Bvh, Hit, Probe, Ray};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -30,6 +31,8 @@ pub struct Tlas {
     wide: WideBvh,
     isa: Isa,
     placements: Vec<Placement>,
+    /// What its leaves are.
+    entries: Vec<Entry>,
     /// How many times more than the world's own rounding a ray may stray when transformed.
     slack: f32,
 }
@@ -78,9 +81,8 @@ impl Placement {
         }
     }
 
-    /// The box of the placed corners, rounded outward.
-    fn world_bounds(&self) -> Aabb {
-        let local = self.blas.bounds();
+    /// The box around a `local` one with its placed corners, rounded outward.
+    pub(super) fn world_bounds(&self, local: Aabb) -> Aabb {
         if self.identity || local.is_empty() {
             return local;
         }
@@ -120,14 +122,9 @@ impl Tlas {
     /// Builds over `placements`; `Hit::instance` will index them.
     #[must_use]
     pub fn build(placements: Vec<Placement>) -> Self {
-        // An empty mesh gets a point that is never entered with a hit.
-        let boxes: Vec<Aabb> = placements
-            .iter()
-            .map(Placement::world_bounds)
-            .map(|b| if b.is_empty() { Aabb { min: Vec3::ZERO, max: Vec3::ZERO } } else { b })
-            .collect();
+        let (entries, boxes) = entries(&placements);
         let slack = placements.iter().map(Placement::condition).fold(1.0, f32::max);
-        Self { wide: WideBvh::new(&Bvh::build(&boxes), 1), isa: Isa::detect(), placements, slack }
+        Self { wide: WideBvh::new(&Bvh::build(&boxes), 1), isa: Isa::detect(), placements, entries, slack }
     }
 
     /// What it was built over.
@@ -152,6 +149,12 @@ impl Tlas {
     #[must_use]
     pub fn hierarchy(&self) -> &WideBvh {
         &self.wide
+    }
+
+    /// What the leaves of the hierarchy hold.
+    #[must_use]
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
     }
 
     /// The box around everything; empty if there is nothing.
@@ -224,7 +227,7 @@ impl Target for Tlas {
     }
 
     #[inline(always)]
-    fn only(&self) -> Option<(&Blas, u32)> {
+    fn only(&self) -> Option<Inside<'_>> {
         None
     }
 
@@ -239,12 +242,12 @@ impl Target for Tlas {
     }
 
     #[inline(always)]
-    fn enter(&self, entry: usize, ray: &Ray) -> (&Blas, u32, Option<Probe>) {
-        let instance = self.wide.prims[entry];
+    fn enter(&self, leaf: usize, ray: &Ray) -> (Inside<'_>, u32, Option<Probe>) {
+        let Entry { instance, child } = self.entries[self.wide.prims[leaf] as usize];
         let placement = &self.placements[instance as usize];
         let blas = &*placement.blas;
         let local = (!placement.identity).then(|| Probe::new(&placement.local(ray), &blas.bounds()));
-        (blas, instance, local)
+        (Inside { blas, instance, moved: local.is_some() }, child, local)
     }
 
     #[inline(always)]
@@ -258,7 +261,7 @@ impl Target for Tlas {
         let Scratch { packet, found, waiting, numbers, inner } = scratch;
         let inner = inner.get_or_insert_with(Scratch::new);
         let mut visitor = Instances::<F, ANY> { tlas: self, found, numbers, filter, inner };
-        self.wide.traverse_packet::<S, false>(simd, packet, rays, waiting, &mut visitor)
+        self.wide.traverse_packet::<S, false>(simd, packet, 0, rays, waiting, &mut visitor)
     }
 }
 
@@ -272,16 +275,22 @@ struct Instances<'a, F, const ANY: bool> {
 }
 
 impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
-    /// Takes rays through one instance.
+    /// Takes rays through one entry.
     #[inline(always)]
-    fn instance<S: Simd>(&mut self, simd: S, packet: &mut Packet, instance: u32, rays: u64) -> u64 {
+    fn entry<S: Simd>(&mut self, simd: S, packet: &mut Packet, entry: u32, rays: u64) -> u64 {
+        let Entry { instance, child } = self.tlas.entries[entry as usize];
         let placement = &self.tlas.placements[instance as usize];
-        let blas = &*placement.blas;
+        let (blas, child) = (&*placement.blas, Child::unpack(child));
         let Scratch { packet: local, found, waiting, numbers, .. } = &mut *self.inner;
         if placement.identity {
             let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
-            return blas.wide.traverse_packet::<S, ANY>(simd, packet, rays, waiting, &mut visitor);
+            return match child {
+                Child::Node(root) => {
+                    blas.wide.traverse_packet::<S, ANY>(simd, packet, root, rays, waiting, &mut visitor)
+                }
+                Child::Leaf { first, count } => visitor.many(simd, packet, first, count, rays),
+            };
         }
         let mut moved = Rays::blank();
         let mut lanes = [0; PACKET];
@@ -301,13 +310,13 @@ impl<F: Filter, const ANY: bool> Instances<'_, F, ANY> {
                 found.copy(i, self.found, lane);
             }
             let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter: self.filter };
-            let ended = blas.wide.traverse_packet::<S, ANY>(
-                simd,
-                local,
-                lowest(members.count_ones() as usize),
-                waiting,
-                &mut visitor,
-            );
+            let all = lowest(members.count_ones() as usize);
+            let ended = match child {
+                Child::Node(root) => {
+                    blas.wide.traverse_packet::<S, ANY>(simd, local, root, all, waiting, &mut visitor)
+                }
+                Child::Leaf { first, count } => visitor.many(simd, local, first, count, all),
+            };
             for (i, member) in each(members).enumerate() {
                 let lane = lanes[member % PACKET];
                 self.found.copy(lane, found, i);
@@ -323,9 +332,9 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
     #[inline(always)]
     fn many(&mut self, simd: S, packet: &mut Packet, first: usize, count: usize, rays: u64) -> u64 {
         let tlas = self.tlas;
-        // One instance to a leaf: each is asked for by its own box.
+        // One entry to a leaf: each is asked for by its own box.
         debug_assert_eq!(count, 1);
-        self.instance(simd, packet, tlas.wide.prims[first], rays)
+        self.entry(simd, packet, tlas.wide.prims[first], rays)
     }
 
     #[inline(always)]
@@ -340,7 +349,7 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
     ) -> ControlFlow<(), f32> {
         let tlas = self.tlas;
         debug_assert_eq!(count, 1);
-        let instance = tlas.wide.prims[first];
+        let Entry { instance, child } = tlas.entries[tlas.wide.prims[first] as usize];
         let placement = &tlas.placements[instance as usize];
         let blas = &*placement.blas;
         let local = (!placement.identity)
@@ -348,8 +357,13 @@ impl<S: Simd, F: Filter, const ANY: bool> Visitor<S> for Instances<'_, F, ANY> {
         let probe = local.as_ref().unwrap_or(probe);
         let (found, numbers, filter) = (&mut *self.found, self.numbers, self.filter);
         let mut visitor = Triangles::<F, ANY> { blas, instance, found, numbers, filter };
-        let waiting: &mut Waiting = &mut self.inner.waiting.single;
-        blas.wide.traverse_one(simd, packet, probe, lane, 0, waiting, &mut visitor)?;
-        ControlFlow::Continue(packet.rays.t_max.0[lane % PACKET])
+        match Child::unpack(child) {
+            Child::Node(root) => {
+                let waiting: &mut Waiting = &mut self.inner.waiting.single;
+                blas.wide.traverse_one(simd, packet, probe, lane, root, waiting, &mut visitor)?;
+                ControlFlow::Continue(packet.rays.t_max.0[lane % PACKET])
+            }
+            Child::Leaf { first, count } => visitor.one(simd, packet, probe, lane, first, count),
+        }
     }
 }

@@ -64,13 +64,14 @@ impl Default for PacketWaiting {
 }
 
 impl WideBvh {
-    /// Takes the `rays` of the packet through all leaves that any of them enters; returns those of which
+    /// Takes the `rays` of the packet through all leaves below node `root` that any of them enters; returns those of which
     /// the visitor said that they need no more.
     #[inline(always)]
     pub(super) fn traverse_packet<S: Simd, const ANY: bool>(
         &self,
         simd: S,
         packet: &mut Packet,
+        root: usize,
         rays: u64,
         waiting: &mut PacketWaiting,
         visitor: &mut impl Visitor<S>,
@@ -93,7 +94,7 @@ impl WideBvh {
         }
         let mut t_bound = packet.t_bound(simd, lanes);
         let mut count = 0;
-        let mut node = 0;
+        let mut node = root;
         let mut entered = rays;
         loop {
             count += packet.enter(simd, &self.nodes[node], node, t_bound, entered, waiting, count);

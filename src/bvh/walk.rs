@@ -3,12 +3,12 @@
 //! A step of one ray waits for memory and for a long chain of dependent operations; the steps of other rays
 //! fill that time.
 
-use super::batch::Target;
+use super::batch::{Inside, Target};
 use super::filter::Filter;
 use super::simd::{Part, Simd};
 use super::single::{Boxes, Waiting};
-use super::wide::{Child, WideNode};
-use super::{Blas, Hit, Probe, Ray};
+use super::wide::Child;
+use super::{Hit, Probe, Ray};
 use std::ops::ControlFlow;
 
 /// Rays under way at a time. Measured on bounces: 1 is 10 % slower, 3 are 5 %.
@@ -24,7 +24,7 @@ struct Walker<'a, S: Simd> {
     probe: Probe,
     best: Option<Hit>,
     /// The instance that it is in, and how many children wait outside; not needed for one level.
-    inside: Option<(&'a Blas, u32)>,
+    inside: Option<Inside<'a>>,
     outside: usize,
     ray: Ray,
     world: Probe,
@@ -111,13 +111,8 @@ impl<'a, S: Simd> Walker<'a, S> {
             (self.inside, self.outside) = (None, 0);
             (self.ray, self.world) = (ray, self.probe);
         }
-        self.enter_root(simd, target.nodes());
-    }
-
-    #[inline(always)]
-    fn enter_root(&mut self, simd: S, nodes: &[WideNode]) {
         self.boxes = Boxes::new(simd, &self.probe);
-        if let Some(root) = nodes.first() {
+        if let Some(root) = target.nodes().first() {
             self.count += self.boxes.enter(root, self.t_max, &mut self.waiting, self.count);
         }
     }
@@ -126,9 +121,14 @@ impl<'a, S: Simd> Walker<'a, S> {
     #[inline(always)]
     fn step<T: Target, F: Filter, const ANY: bool>(&mut self, simd: S, target: &'a T, filter: F) -> bool {
         loop {
-            if !T::ONE_LEVEL && self.inside.is_some() && self.count == self.outside {
-                self.probe = self.world;
-                self.boxes = Boxes::new(simd, &self.probe);
+            if !T::ONE_LEVEL
+                && self.count == self.outside
+                && let Some(inside) = self.inside
+            {
+                if inside.moved {
+                    self.probe = self.world;
+                    self.boxes = Boxes::new(simd, &self.probe);
+                }
                 (self.inside, self.outside) = (None, 0);
             }
             if self.count == 0 {
@@ -151,12 +151,12 @@ impl<'a, S: Simd> Walker<'a, S> {
         child: Child,
     ) -> bool {
         let inside = if T::ONE_LEVEL { target.only() } else { self.inside };
-        let nodes = inside.map_or(target.nodes(), |(blas, _)| &blas.wide.nodes);
+        let nodes = inside.map_or(target.nodes(), |inside| &inside.blas.wide.nodes);
         match (child, inside) {
             (Child::Node(index), _) => {
                 self.count += self.boxes.enter(&nodes[index], self.t_max, &mut self.waiting, self.count);
             }
-            (Child::Leaf { first, count }, Some((blas, instance))) => {
+            (Child::Leaf { first, count }, Some(Inside { blas, instance, .. })) => {
                 let (best, number) = (&mut self.best, self.number);
                 let leaf = (first, count);
                 let all = F::ALL || !filter.asks(instance);
@@ -175,11 +175,19 @@ impl<'a, S: Simd> Walker<'a, S> {
                 }
             }
             (Child::Leaf { first, .. }, None) => {
-                let (blas, instance, local) = target.enter(first, &self.ray);
-                self.probe = local.unwrap_or(self.world);
-                (self.inside, self.outside) = (Some((blas, instance)), self.count);
-                self.enter_root(simd, &blas.wide.nodes);
-                return true;
+                let (inside, child, local) = target.enter(first, &self.ray);
+                if let Some(local) = local {
+                    self.probe = local;
+                    self.boxes = Boxes::new(simd, &self.probe);
+                }
+                (self.inside, self.outside) = (Some(inside), self.count);
+                if let Child::Node(root) = Child::unpack(child) {
+                    let root = &inside.blas.wide.nodes[root];
+                    self.count += self.boxes.enter(root, self.t_max, &mut self.waiting, self.count);
+                } else {
+                    self.waiting.put(self.count, child);
+                    self.count += 1;
+                }
             }
         }
         true

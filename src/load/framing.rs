@@ -3,7 +3,7 @@
 use super::report::{Kind, Sink};
 use super::studio;
 use crate::scene::{
-    ActiveCamera, Camera, GlobalTransform, Instance, Light, Material, Mesh, Projection, SceneBounds,
+    ActiveCamera, Camera, GlobalTransform, Hidden, Instance, Light, Material, Mesh, Projection, SceneBounds,
     Transform, Visible, propagate_transforms,
 };
 use bevy_ecs::name::Name;
@@ -35,8 +35,7 @@ pub(super) fn complete(file: &str, camera: Option<Entity>, sink: &mut Sink<'_>) 
     drop_far_instances(file, sink);
     let survey = survey(sink.world);
     let bounds = survey.bounds.unwrap_or(Box3 { min: DVec3::splat(-1.0), max: DVec3::ONE });
-    let radius = (0.5 * bounds.diagonal()).max(1e-30);
-    let ball = SceneBounds { center: 0.5 * (bounds.min + bounds.max), radius };
+    let ball = bounds.ball();
     sink.world.insert_resource(ball);
     if survey.bounds.is_none() {
         sink.ignored(file, "", "no triangle to see in it: the picture will be empty");
@@ -56,6 +55,12 @@ fn propagate(world: &mut World) {
     let _ = world.run_system_once(propagate_transforms);
 }
 
+/// Around what is seen as it is now; `None` without triangles. Outliers are left out.
+#[must_use]
+pub fn bounds_now(world: &mut World) -> Option<SceneBounds> {
+    survey(world).bounds.map(|bounds| bounds.ball())
+}
+
 /// An axis-aligned box in world space.
 #[derive(Clone, Copy)]
 struct Box3 {
@@ -66,6 +71,10 @@ struct Box3 {
 impl Box3 {
     fn diagonal(&self) -> f64 {
         (self.max - self.min).length()
+    }
+
+    fn ball(&self) -> SceneBounds {
+        SceneBounds { center: 0.5 * (self.min + self.max), radius: (0.5 * self.diagonal()).max(1e-30) }
     }
 }
 
@@ -86,7 +95,7 @@ struct Sample {
 }
 
 fn survey(world: &mut World) -> Survey {
-    let query = world.query::<(&Instance, &GlobalTransform)>();
+    let query = world.query_filtered::<(&Instance, &GlobalTransform), Without<Hidden>>();
     let meshes = |instance: &Instance| world.get::<Mesh>(instance.mesh).map(|mesh| &mesh.0);
     let total: usize =
         query.iter_manual(world).filter_map(|(i, _)| meshes(i)).map(|mesh| mesh.triangles.len()).sum();

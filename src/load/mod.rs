@@ -36,6 +36,7 @@ pub(crate) use error::choices;
 pub use error::{LoadError, ReadError};
 pub use files::{SceneFiles, Stamp, stamp};
 pub use folder::{edited_scene, scenes_in};
+pub use framing::bounds_now;
 pub(crate) use framing::{ADDED_LIGHT, light_for};
 pub use made::Made;
 pub use report::{Found, Kind, LoadReport, Phase, Remark, Watcher, harmless};

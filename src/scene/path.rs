@@ -42,6 +42,13 @@ pub fn path_of(world: &World, entity: Entity) -> Vec<String> {
     Paths::new(world).of(entity)
 }
 
+/// What it and those beside it are called in paths.
+#[must_use]
+pub fn siblings(world: &World, entity: Entity) -> Vec<String> {
+    let parent = world.get::<ChildOf>(entity).map(ChildOf::parent);
+    labels(world, parent).into_iter().map(|(_, label)| label).collect()
+}
+
 /// The entity at the end of `path`, if there is one.
 #[must_use]
 pub fn find(world: &World, path: &[String]) -> Option<Entity> {

@@ -6,12 +6,14 @@ use crate::scene::{GlobalTransform, Hidden, Instance, Mesh, TriangleMesh};
 use crate::trace::Geometry;
 use crate::trace::scene::InstanceData;
 use bevy_ecs::prelude::*;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::cmp::Reverse;
 use std::sync::Arc;
 
-/// Picks [`RenderOrigin`] when the first geometry is there: the scene's middle, in steps of a power of two not
-/// below its extent from where the first instance is. So a scene around the origin stays where it is, and one
-/// that is moved as a whole has the same coordinates again, to the bit.
+/// Picks [`RenderOrigin`] when the first geometry is there: where the largest instance is of those that are neither turned nor scaled
+/// (or of all), which so needs no placement; from there, where the scene's middle is farther than its extent, in steps of a
+/// power of two towards it. So a scene around the origin stays where it is, and one that is moved as a whole has the same
+/// coordinates again, to the bit.
 pub fn choose_origin(
     mut origin: ResMut<RenderOrigin>,
     instances: Query<(Entity, &Instance, &GlobalTransform)>,
@@ -21,15 +23,17 @@ pub fn choose_origin(
         return;
     }
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let mut first: Option<(Entity, DVec3)> = None;
+    let mut largest: Option<((bool, f64, Reverse<u32>), DVec3)> = None;
     for (entity, instance, global) in &instances {
         let Ok(MeshBlas(blas)) = meshes.get(instance.mesh) else { continue };
         let bounds = blas.bounds();
         if bounds.is_empty() {
             continue;
         }
-        if first.is_none_or(|(before, _)| entity < before) {
-            first = Some((entity, global.0.translation));
+        let size = global.0.matrix3 * (bounds.max.as_dvec3() - bounds.min.as_dvec3());
+        let rank = (global.0.matrix3 == DMat3::IDENTITY, size.length(), Reverse(entity.index_u32()));
+        if largest.is_none_or(|(before, _)| rank > before) {
+            largest = Some((rank, global.0.translation));
         }
         for corner in [bounds.min, bounds.max] {
             let p = global.0.transform_point3(corner.as_dvec3());
@@ -42,9 +46,9 @@ pub fn choose_origin(
     let extent = (high - low).max_element();
     let finite = low.is_finite() && high.is_finite();
     let grid = if extent > 0.0 { extent.log2().ceil().exp2() } else { 1.0 };
-    let from = first.map_or(DVec3::ZERO, |(_, place)| place);
+    let from = largest.map_or(DVec3::ZERO, |(_, place)| place);
     let steps = ((low + high) * 0.5 - from) / grid;
-    origin.0 = Some(if finite { from + steps.round() * grid } else { DVec3::ZERO });
+    origin.0 = Some(if finite { from + steps.trunc() * grid } else { DVec3::ZERO });
 }
 
 /// Builds the TLAS anew when an instance came, went, moved or changed its mesh or materials.
@@ -110,4 +114,36 @@ fn flattened(mesh: &TriangleMesh, render_from_local: DAffine3) -> Option<(Placem
         ..TriangleMesh::default()
     };
     (!placement.blas().bounds().is_empty()).then(|| (placement, Arc::new(flat())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_ecs::system::RunSystemOnce;
+
+    /// The origin of a room whose middle is beside its own origin, and of a ball in it, with many more triangles.
+    fn origin(room_at: DVec3) -> DVec3 {
+        let mut world = World::new();
+        world.init_resource::<RenderOrigin>();
+        let triangle = [Vec3::ZERO, Vec3::new(8.0, 4.0, 0.0), Vec3::new(0.0, 4.0, 3.0)];
+        for (triangles, turn, at) in [
+            (vec![triangle.map(|p| p * 0.1); 50], DMat3::from_rotation_y(1.0), DVec3::new(6.0, 1.0, 1.0)),
+            (vec![triangle.map(|p| p * 0.1); 50], DMat3::IDENTITY, DVec3::new(2.0, 1.0, 1.0)),
+            (vec![triangle], DMat3::IDENTITY, DVec3::ZERO),
+        ] {
+            let mesh = world.spawn(MeshBlas(Arc::new(Blas::build(&triangles)))).id();
+            let place = DAffine3::from_mat3_translation(turn, at + room_at);
+            world.spawn((Instance { mesh, materials: Vec::new() }, GlobalTransform(place)));
+        }
+        world.run_system_once(choose_origin).unwrap();
+        world.resource::<RenderOrigin>().0.unwrap()
+    }
+
+    #[test]
+    fn what_is_largest_needs_no_placement_and_a_scene_that_is_moved_takes_its_origin_along() {
+        assert_eq!(origin(DVec3::ZERO), DVec3::ZERO);
+        for far in [DVec3::new(1e6, -3e5, 0.1), DVec3::splat(1e12)] {
+            assert_eq!(origin(far), far);
+        }
+    }
 }

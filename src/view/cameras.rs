@@ -1,10 +1,12 @@
 //! Places to look from: the file's cameras and the sides of the scene; and kinds of projection.
 
 use super::controls::{Notice, Notices};
+use super::edit::Editor;
 use super::fly::{FlyCamera, FlyCameraState};
 use super::input::Input;
 use super::keymap::{Side, Tap};
 use super::orbit::{Navigation, pivot_depth};
+use crate::load::bounds_now;
 use crate::scene::{ActiveCamera, Camera, Lens, Projection, SceneBounds, Transform};
 use crate::trace::RenderSettings;
 use bevy_ecs::prelude::*;
@@ -66,10 +68,27 @@ pub fn choose_camera(
     }
 }
 
+/// Around the scene as it has been edited.
+#[derive(Resource, Clone, Copy, Debug)]
+pub struct EditedBounds(SceneBounds);
+
+/// Finds them when they are asked for.
+pub fn survey_edited(world: &mut World) {
+    let is_edited = world.get_resource::<Editor>().is_some_and(Editor::has_edits);
+    if !world.resource::<Input>().taps.iter().any(|press| press.tap == Tap::FrameAll) {
+        return;
+    }
+    match bounds_now(world).filter(|_| is_edited) {
+        Some(bounds) => world.insert_resource(EditedBounds(bounds)),
+        None => drop(world.remove_resource::<EditedBounds>()),
+    }
+}
+
 /// Looks from a side at the pivot, or at the whole scene.
 pub fn choose_side(
     input: Res<Input>,
-    bounds: Option<Res<SceneBounds>>,
+    loaded: Option<Res<SceneBounds>>,
+    edited: Option<Res<EditedBounds>>,
     settings: Res<RenderSettings>,
     mut navigation: ResMut<Navigation>,
     mut cameras: Query<(&mut FlyCameraState, &mut Transform, &mut Camera), With<FlyCamera>>,
@@ -81,7 +100,10 @@ pub fn choose_side(
             match press.tap {
                 Tap::View(side) => state.set_if_neq(looking_from(side)),
                 Tap::FrameAll => {
-                    let Some(bounds) = &bounds else { continue };
+                    let Some(bounds) = edited.as_ref().map(|edited| edited.0).or(loaded.as_deref().copied())
+                    else {
+                        continue;
+                    };
                     navigation.pivot = bounds.center;
                     distance = frame(&mut camera, bounds.radius, settings.size);
                     true

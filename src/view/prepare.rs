@@ -1,7 +1,9 @@
 //! The window's resources and systems in a world, and what it says of itself.
 
 use super::bookmarks::{Bookmarks, recall, remember};
-use super::cameras::{FileCameras, change_lens, change_projection, choose_camera, choose_side};
+use super::cameras::{
+    FileCameras, change_lens, change_projection, choose_camera, choose_side, survey_edited,
+};
 use super::controls::{
     Notices, Paused, change_display, change_pause, change_settings, change_shown, print_camera, save_picture,
 };
@@ -95,7 +97,8 @@ pub fn prepare(app: &mut App, interrupt: &Arc<AtomicBool>) {
             save_picture,
             change_display,
             (change_pause, advance).chain(),
-            (change_speed, change_navigation, choose_camera, take_off, recall, choose_side).chain(),
+            (change_speed, change_navigation, choose_camera, take_off, recall, survey_edited, choose_side)
+                .chain(),
             (change_projection, change_lens, focus, look_around, fly_camera, orbit_camera).chain(),
             (choose_pixel_view, change_debug, edit_scene).chain(),
         )
@@ -143,7 +146,7 @@ pub fn status(app: &App) -> Status {
             let size = max - min;
             [min.x, min.y, size.x, size.y]
         }),
-        card: world.get_resource::<LoadCard>().map_or_else(|| Arc::from(""), |card| Arc::clone(&card.text)),
+        card: world.get_resource::<LoadCard>().map_or_else(|| Arc::from(""), |card| Arc::clone(card.now())),
         machine: machine(world),
         resets: world.resource::<Redone>().resets,
         dropped: stats.dropped,

@@ -14,7 +14,7 @@ use super::playing::Clock;
 use crate::app::{App, FrameBudget};
 use crate::image::Display;
 use crate::load::{LoadOptions, SceneFiles, SceneSource, Watcher};
-use crate::open::{OpenError, SceneOrigin, Wishes, open};
+use crate::open::{LoadCard, OpenError, SceneOrigin, Wishes, open};
 use crate::scene::{ActiveCamera, Camera, GlobalTransform, Lens, Playing, Transform};
 use crate::shown::Shown;
 use crate::sync::{BlasCache, Instructions, RenderOrigin};
@@ -115,7 +115,11 @@ pub fn load_again(app: &mut App, watcher: Watcher) -> Result<App, String> {
             // What it did not come to has changed as well perhaps, and would ask for it again and again.
             origin.options.files.refresh();
             origin.options.files.extend(&files);
-            return Err(error.to_string());
+            let why = error.to_string();
+            if let Some(mut card) = app.world.get_resource_mut::<LoadCard>() {
+                card.outdate(&why);
+            }
+            return Err(why);
         }
     };
     again.world.resource_mut::<SceneOrigin>().camera = origin.camera;

@@ -2,8 +2,10 @@
 
 use super::layer::Line;
 use crate::bvh::wide::{Child, WIDTH};
-use crate::bvh::{Aabb, Placement, Tlas, WideBvh};
+use crate::bvh::{Aabb, Blas, Placement, Tlas, WideBvh};
 use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Which boxes are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,9 +87,14 @@ pub fn color_of(level: u32) -> [u8; 3] {
     COLORS[level as usize % COLORS.len()]
 }
 
-/// Tells `see` of each box below `nodes`' root: its level, whether it is a leaf, and of how many entries.
-fn walk(hierarchy: &WideBvh, level: u32, see: &mut impl FnMut(u32, Aabb, Option<(usize, usize)>)) {
-    let mut stack = if hierarchy.nodes.is_empty() { Vec::new() } else { vec![(0, level)] };
+/// Tells `see` of each box below node `root`: its level, whether it is a leaf, and of how many entries.
+fn walk(
+    hierarchy: &WideBvh,
+    root: usize,
+    level: u32,
+    see: &mut impl FnMut(u32, Aabb, Option<(usize, usize)>),
+) {
+    let mut stack = if hierarchy.nodes.is_empty() { Vec::new() } else { vec![(root, level)] };
     while let Some((index, level)) = stack.pop() {
         let node = &hierarchy.nodes[index];
         for slot in 0..WIDTH {
@@ -125,34 +132,43 @@ pub fn show(tlas: &Tlas, boxes: Boxes) -> (Vec<Line>, Statistics) {
     };
     add(0, Placed { bounds: tlas.bounds(), placement: None }, false);
     let mut inner = Vec::new();
-    walk(tlas.hierarchy(), 0, &mut |level, bounds, leaf| {
-        add(level, Placed { bounds, placement: None }, false);
+    walk(tlas.hierarchy(), 0, 0, &mut |level, bounds, leaf| {
+        let entry = leaf.map(|(first, _)| tlas.entries()[tlas.hierarchy().prims[first] as usize]);
+        let is_leaf = entry.is_some_and(|entry| matches!(entry.child(), Child::Leaf { .. }));
+        add(level, Placed { bounds, placement: None }, is_leaf);
         statistics.levels = statistics.levels.max(level + 1);
-        inner.extend(leaf.map(|(first, _)| (tlas.hierarchy().prims[first], level)));
+        inner.extend(entry.map(|entry| (entry, level)));
     });
     statistics.nodes += tlas.hierarchy().nodes.len();
-    let mut seen: Vec<*const crate::bvh::Blas> = Vec::new();
+    let mut counted: HashMap<*const Blas, u32> = HashMap::new();
     let mut largest = 0;
-    for (instance, level) in inner {
-        let placement = &placements[instance as usize];
+    for (entry, level) in inner {
+        let placement = &placements[entry.instance as usize];
         let blas = placement.blas();
-        let is_new = !seen.contains(&std::sync::Arc::as_ptr(blas));
         let hierarchy = blas.hierarchy();
-        walk(hierarchy, level, &mut |level, bounds, leaf| {
-            add(level, Placed { bounds, placement: Some(placement) }, leaf.is_some());
-            statistics.levels = statistics.levels.max(level + 1);
-            if let (true, Some((_, count))) = (is_new, leaf) {
-                statistics.leaves[count - 1] += 1;
-            }
-        });
-        if is_new {
-            seen.push(std::sync::Arc::as_ptr(blas));
+        let by = counted.entry(Arc::as_ptr(blas)).or_insert_with(|| {
             statistics.nodes += hierarchy.nodes.len();
             statistics.bytes += blas.bytes();
             if hierarchy.prims.len() > largest {
                 (largest, statistics.cost) = (hierarchy.prims.len(), blas.cost());
             }
-        }
+            entry.instance
+        });
+        let is_counted = *by == entry.instance;
+        let root = match entry.child() {
+            Child::Node(root) => root,
+            Child::Leaf { count, .. } => {
+                statistics.leaves[count - 1] += usize::from(is_counted);
+                continue;
+            }
+        };
+        walk(hierarchy, root, level, &mut |level, bounds, leaf| {
+            add(level, Placed { bounds, placement: Some(placement) }, leaf.is_some());
+            statistics.levels = statistics.levels.max(level + 1);
+            if let (true, Some((_, count))) = (is_counted, leaf) {
+                statistics.leaves[count - 1] += 1;
+            }
+        });
     }
     statistics.shown = [wanted.min(MOST), wanted];
     (lines, statistics)
@@ -161,9 +177,7 @@ pub fn show(tlas: &Tlas, boxes: Boxes) -> (Vec<Line>, Statistics) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::Blas;
     use glam::DAffine3;
-    use std::sync::Arc;
 
     fn tlas() -> Tlas {
         let triangle = |i: u32| {

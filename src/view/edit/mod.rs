@@ -12,7 +12,7 @@ use super::input::Input;
 use super::keymap::Tap;
 use crate::app::FrameStats;
 use crate::load::settings::edit::{EditTable, duplicate};
-use crate::scene::path::{children, path_of};
+use crate::scene::path::{children, path_of, siblings};
 use crate::scene::{Hidden, Instance, Light, Playing, Pose, SceneBounds};
 use crate::sync::Redone;
 use crate::trace::Lights;
@@ -293,7 +293,7 @@ fn below(world: &World, top: Entity) -> Vec<Entity> {
 fn copy(world: &mut World, editor: &mut Editor) {
     let Some(selection) = selected(world, editor) else { return };
     let path = path_of(world, selection.entity);
-    let name = format!("{} copy {}", path.last().map_or("", String::as_str), editor.copies.len() + 1);
+    let name = name_of_copy(path.last().map_or("", String::as_str), &siblings(world, selection.entity));
     let copies = duplicate(world, selection.entity, &name);
     crate::app::propagate(world);
     editor.redo.clear();
@@ -306,6 +306,15 @@ fn copy(world: &mut World, editor: &mut Editor) {
     if let Some(x) = aside.map(|row| row.stepped(5.0)) {
         set(world, copied.entity, copied.slot, Property::Position(0), x);
     }
+}
+
+/// The first of "… copy 1", "… copy 2" that nobody beside it has. A copy of a copy is one more of the same.
+fn name_of_copy(original: &str, taken: &[String]) -> String {
+    let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
+    let base =
+        original.rsplit_once(" copy ").filter(|(_, n)| is_number(n)).map_or(original, |(base, _)| base);
+    let names = (1..).map(|n: u32| format!("{base} copy {n}"));
+    names.into_iter().find(|name| !taken.contains(name)).unwrap_or_default()
 }
 
 /// Before the arrays are brought up to date.

@@ -6,7 +6,7 @@ use super::super::input::Press;
 use super::*;
 use crate::app::{App, FrameBudget, FrameSystems};
 use crate::farm::Identity;
-use crate::load::{LoadOptions, SceneSource};
+use crate::load::{LoadOptions, SceneSource, bounds_now};
 use crate::open::{Wishes, open};
 use crate::scene::{GlobalTransform, Light, Transform};
 use crate::sync::RenderOrigin;
@@ -155,6 +155,49 @@ fn undo_brings_everything_back_to_the_bit() {
     press(&mut app, Tap::Undo, PLACES[0]);
     let said = app.world.resource::<Notices>().0.last().cloned();
     assert_eq!(said, Some(Notice::Text("nothing to undo".to_owned())));
+}
+
+#[test]
+fn copies_of_copies_are_counted_and_no_two_have_one_name() {
+    let taken = ["ball", "ball copy 1", "ball copy 3", "copy x"].map(str::to_owned);
+    for (original, copy) in [
+        ("ball", "ball copy 2"),
+        ("ball copy 1", "ball copy 2"),
+        ("copy x", "copy x copy 1"),
+        ("the copy x", "the copy x copy 1"),
+        ("", " copy 1"),
+    ] {
+        assert_eq!(name_of_copy(original, &taken), copy);
+    }
+    // Also of those that another file has made.
+    let mut app = editable("cornell");
+    choose(&mut app, PLACES[0]);
+    let mut names = Vec::new();
+    for _ in 0..3 {
+        press(&mut app, Tap::Duplicate, PLACES[0]);
+        names.push(status(&app).name.clone());
+        app.world.resource_mut::<Editor>().copies.clear();
+    }
+    let [first, others @ ..] = &names[..] else { panic!() };
+    let base = first.rsplit_once('1').unwrap().0;
+    assert_eq!(others, [format!("{base}2"), format!("{base}3")]);
+}
+
+#[test]
+fn the_whole_scene_is_what_it_is_after_edits() {
+    let mut app = editable("cornell");
+    let loaded = *app.world.resource::<SceneBounds>();
+    assert_eq!(bounds_now(&mut app.world), Some(loaded));
+    choose(&mut app, [0.5, 0.8]);
+    let Selection { entity, slot } = app.world.resource::<Editor>().selected.unwrap();
+    set(&mut app.world, entity, slot, Property::Position(0), 3.0 * loaded.radius);
+    app.frame();
+    let wider = bounds_now(&mut app.world).unwrap();
+    assert!(wider.radius > 1.2 * loaded.radius && wider.center.x > loaded.center.x, "{wider:?}");
+    // Who does not see it does not look for it.
+    press(&mut app, Tap::Hide, [0.5, 0.8]);
+    let smaller = bounds_now(&mut app.world).unwrap();
+    assert!(smaller.radius <= loaded.radius, "{smaller:?} {loaded:?}");
 }
 
 #[test]

@@ -10,8 +10,9 @@ use crate::bvh::Isa;
 use crate::cli::{Cli, Command};
 use crate::farm::Identity;
 use crate::image::ToneMap;
+use crate::load::bounds_now;
 use crate::open::{LoadCard, Pose};
-use crate::scene::Filter;
+use crate::scene::{Filter, SceneBounds};
 use crate::trace::Integrator;
 use bevy_ecs::name::Name;
 use clap::Parser;
@@ -209,6 +210,41 @@ fn what_was_looked_for_in_vain_is_known_after_a_failure() {
         Some(&crate::load::stamp(&stage.0.join("scene.toml")))
     );
     assert!(files.contains_key(&stage.0.join("floor.obj")));
+}
+
+#[test]
+fn home_shows_the_scene_as_it_has_been_edited() {
+    let stage = Stage::new("home");
+    let mut app = stage.scene_shown();
+    let loaded = app.world.resource::<SceneBounds>().center;
+    let mut home = |taps: &[Tap]| {
+        press(&mut app, taps);
+        press(&mut app, &[Tap::FrameAll]);
+        (app.world.resource::<Navigation>().pivot, bounds_now(&mut app.world).unwrap().center)
+    };
+    let (edited, center) = home(&EDIT);
+    assert_eq!(edited, center);
+    assert_ne!(edited, loaded);
+    assert_eq!(home(&[Tap::Undo; 4]), (loaded, loaded));
+}
+
+#[test]
+fn the_report_says_that_a_file_cannot_be_loaded_until_it_can() {
+    let stage = Stage::new("outdated");
+    let mut app = stage.scene_shown();
+    let card = |app: &App| app.world.resource::<LoadCard>().now().to_string();
+    let before = card(&app);
+    let (title, rest) = before.split_once('\n').unwrap();
+    let scene = title.strip_suffix(": valid").unwrap();
+    // Twice, for the second must not tell of the first.
+    for missing in ["missing.obj", "gone.obj"] {
+        stage.write("scene.toml", &Stage::scene(missing, 9));
+        let why = load_again(&mut app, Watcher::default()).err().unwrap();
+        assert_eq!(card(&app), format!("{scene}: still the old scene\n  error         {why}\n{rest}"));
+    }
+    stage.write("scene.toml", &Stage::scene("floor.obj", 9));
+    let again = load_again(&mut app, Watcher::default()).unwrap();
+    assert_eq!(card(&again).split_once('\n').unwrap().0, title);
 }
 
 #[test]
