@@ -65,7 +65,7 @@ pub(super) fn entries(placements: &[Placement]) -> (Vec<Entry>, Vec<Aabb>) {
     let (mut entries, mut boxes) = (Vec::new(), Vec::new());
     let mut largest = BinaryHeap::new();
     let mut whole = Aabb::EMPTY;
-    // Rays are another ones in what is moved: made ready for each entry of it.
+    // Into what is moved rays have to be taken: for each of its entries anew.
     let openable =
         |placement: &Placement, child: Child| placement.is_identity() && matches!(child, Child::Node(_));
     for (instance, placement) in (0..).zip(placements) {

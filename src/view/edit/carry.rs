@@ -33,7 +33,11 @@ fn edit_again(world: &mut World, editor: &mut Editor, table: EditTable) {
     let Some(original) = original else { return editor.waiting.push(table) };
     let selection = Selection { entity: original, slot };
     if table.copy_of.is_none() {
-        remember(world, editor, selection, None);
+        // To undo a copy is to have it no more, wherever it was put: one step. A material is not its own.
+        let is_of_copy = editor.undo.iter().any(|undo| undo.copies.contains(&original));
+        if !is_of_copy || table.material.is_some() {
+            remember(world, editor, selection, None);
+        }
         editor.note(selection);
     }
     // What does not fit any more, such as the sizes of another kind of light, is as the files say.

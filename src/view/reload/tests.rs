@@ -126,6 +126,19 @@ fn edits_are_known_after_any_number_of_reloads_and_undone_to_what_the_files_say(
 }
 
 #[test]
+fn a_copy_that_was_carried_over_is_undone_in_one_step() {
+    let stage = Stage::new("carried");
+    let mut app = stage.scene_shown();
+    press(&mut app, &EDIT[..2]);
+    let moved = identity(&app);
+    press(&mut app, &EDIT[2..]);
+    let mut app = again(&mut app);
+    assert_ne!(identity(&app).differences(&moved), Vec::<String>::new());
+    press(&mut app, &[Tap::Undo]);
+    assert_eq!(identity(&app).differences(&moved), Vec::<String>::new());
+}
+
+#[test]
 fn edits_of_what_is_gone_wait_until_it_is_back() {
     let stage = Stage::new("waiting");
     let mut app = stage.scene_shown();
