@@ -5,6 +5,7 @@
 //! is one hexagon instead of a dozen triangles.
 
 use glam::{DVec3, Vec3};
+use std::cmp::Ordering;
 
 /// Most corners of an outline.
 pub const EDGES: usize = 8;
@@ -21,6 +22,14 @@ pub struct Blocker {
 }
 
 impl Blocker {
+    /// Some order, the same however they were found.
+    #[must_use]
+    pub fn order(&self, other: &Self) -> Ordering {
+        let [these, others] = [self, other].map(|blocker| blocker.corners.map(|p| p.to_array()));
+        let pairs = these.as_flattened().iter().zip(others.as_flattened());
+        pairs.map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    }
+
     /// What of the triangle is above the plane through `on` with `normal` by more than `tolerance`, in units of both; `None`
     /// if nothing is.
     #[must_use]

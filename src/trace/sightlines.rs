@@ -182,6 +182,8 @@ impl Sightlines {
             self.blockers.truncate(first);
             return None;
         }
+        // In which order they are found is the hierarchy's affair: something behind a wall that nobody sees may change it.
+        self.blockers[first..].sort_by(Blocker::order);
         simplify(&mut self.blockers, first, patch);
         if self.blockers.len() - first > FEW {
             self.blockers.truncate(first);
